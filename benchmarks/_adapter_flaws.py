@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks._simulated_flaws import MODULUS_PA, RADIUS_M, Block, Given, Layout
-from diagnose.simulated.stated import Stated
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Material
-from mechanics.model import Model, Tool
+from diagnose.other_simulator.stated import Stated
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Tool
 from mechanics.progress import silent
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 from render.options import BEST, RenderOptions
 from render.registry import create
 from render.replay import replay

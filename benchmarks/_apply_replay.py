@@ -16,15 +16,15 @@ import numpy as np
 from diagnose.apply import corrected, improved, with_effects, with_replayed_modulus
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
+from mechanics.disk.writing import atomic_file
 from mechanics.effects.registry import effect
 from mechanics.errors import RecordingError
-from mechanics.files import atomic_file
-from mechanics.model import Model
-from mechanics.model_files import read_model, write_model
-from mechanics.recording import Recording, read_recording
+from mechanics.model.files import read_model, write_model
+from mechanics.model.model import Model
+from mechanics.recording.recording import Recording, read_recording
 from reconstruct.pipeline import ReconstructOptions, reconstruct
-from reconstruct.placing import presses_on
-from render.fem import FemRenderer
+from reconstruct.presses_on_model import presses_on
+from render.fem.renderer import FemRenderer
 from render.replay import replay_recording, rms_n
 
 QUIET_S = 0.2

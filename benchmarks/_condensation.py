@@ -1,7 +1,7 @@
 """The exact compliance of all touchable degrees of freedom: what benchmarks time and tests compare with.
 
-A servo needs less (mechanics.surface_compliance); this is the Schur complement of the stiffness on the
-touchable nodes, inverted.
+A servo needs less (mechanics.compliance.surface_compliance); this is the Schur complement of the stiffness on
+the touchable nodes, inverted.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from mechanics import pardiso
-from mechanics.elasticity import stiffness
+from mechanics.elastic import pardiso
+from mechanics.elastic.elasticity import stiffness
+from mechanics.elastic.solver import Solver, free_dofs
 from mechanics.errors import MeshError, OptionError
 from mechanics.progress import Progress, silent
-from mechanics.solver import Solver, free_dofs
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.tetmesh import TetMesh
 
 _COLUMNS = 64  # right-hand sides solved at once
 _CONDENSED = 0.75  # share of the unknowns taken from the Schur complement, whose square is held twice;

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks._diagnosis_cases import FINITE, Case
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import PalpateError
-from mechanics.files import atomic_file
-from palpate.tasks.graph import Task, finished
+from palpate.parallel.graph import Task, finished
 from scenes.laboratory.specimen import VERSION
 
 _HERE = "benchmarks._diagnosis_blind"
@@ -101,8 +101,8 @@ def prepare(case: dict[str, Any], solve: bool, work: str, laboratory: int) -> di
 
     Raises NotSolved where touches would have to be solved and `solve` does not allow for it.
     """
-    from mechanics.model_files import write_model
-    from mechanics.recording import read_recording
+    from mechanics.model.files import write_model
+    from mechanics.recording.recording import read_recording
     from reconstruct.pipeline import ReconstructOptions, reconstruct
 
     this, at = _case(case), Path(work)
@@ -167,8 +167,8 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
     from diagnose.options import DiagnoseOptions
     from diagnose.pipeline import diagnose
     from diagnose.verdict.corrections import factors
-    from mechanics.model_files import read_model
-    from mechanics.recording import read_recording
+    from mechanics.model.files import read_model
+    from mechanics.recording.recording import read_recording
 
     this, at = _case(case), Path(work)
     answer: dict[str, Any]

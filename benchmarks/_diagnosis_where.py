@@ -1,8 +1,8 @@
 """How well a verdict says where the gap is: F1 of its bins (places, depth, rate, time) against the truth's.
 
 A bin counts as one with a gap where the gap's rms there exceeds half the noise of a force 3-vector. Both
-sides state newtons in the same bins (mechanics.gap_bins); the truth's touches and a verdict's presses are
-matched by their times.
+sides state newtons in the same bins (mechanics.presses.gap_bins); the truth's touches and a verdict's presses
+are matched by their times.
 """
 
 from __future__ import annotations

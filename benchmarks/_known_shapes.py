@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.nearest import sample
+from mechanics.shape.nearest import sample
 from scenes.phantoms import phantom, rectangle, resampled
 
 Distance = Callable[[np.ndarray], np.ndarray]

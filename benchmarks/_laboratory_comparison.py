@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from mechanics.errors import RecordingError
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from scenes.laboratory.curves import PathJob, Solving, curves
 from scenes.laboratory.specimen import Specimen
 from scenes.phantoms import Phantom

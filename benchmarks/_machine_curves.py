@@ -12,7 +12,7 @@ from scipy.special import expit
 from mechanics.effects.power_law_relaxation import prony_terms
 from mechanics.effects.strain_stiffening import GREATEST, LEAST, hardening
 from mechanics.errors import RecordingError
-from reconstruct.external.compression import Compression
+from reconstruct.machine_curves.compression import Compression
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.solver import Solver
-from mechanics.tetmesh import TetMesh
+from mechanics.elastic.solver import Solver
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.tetmesh import TetMesh
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
 from render.options import RenderOptions
 from render.simulators.mujoco import POISSON_LIMIT as FLEX_POISSON

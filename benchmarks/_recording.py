@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.recording import Recording, read_recording
+from mechanics.recording.recording import Recording, read_recording
 from scenes.embedded import embedded_recording
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from scenes.laboratory.curves import Curve, PathJob, Solving, curves
 from scenes.laboratory.effects import Bench, effect
 from scenes.laboratory.specimen import Fineness, Specimen

@@ -12,12 +12,12 @@ from numba import njit, types
 from benchmarks._closed_loop import enabled_pose
 from benchmarks.compliance import block
 from devices.safety import SafetyOptions, safety_parameters
-from devices.simulated import SPEC
-from mechanics.files import cache_folder
+from devices.virtual_hand import SPEC
+from mechanics.disk.scratch import cache_folder
 from mechanics.kernels import kept
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.model_files import read_model, write_model
+from mechanics.model.files import read_model, write_model
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
 from palpate.servo.clock import c_function, compiled_now_ns, compiled_sleep_until
 from palpate.servo.histogram import BINS, Histogram, count
 from palpate.servo.layout import (

@@ -13,13 +13,13 @@ import numpy as np
 
 from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
 from devices.impedance import HandImpedance
-from devices.simulated import SPEC
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.tetmesh import TetMesh
+from devices.virtual_hand import SPEC
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 from render.base import Renderer
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 from render.passivity import PassivityOptions
 

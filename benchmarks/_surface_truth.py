@@ -9,7 +9,7 @@ import numpy as np
 import pyvista
 from scipy.spatial import cKDTree
 
-from mechanics.nearest import closest, sample
+from mechanics.shape.nearest import closest, sample
 from reconstruct.shapes.evidence import Evidence
 
 TIP_RADIUS_M = 0.005

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.patch import half_space_compliance
-from mechanics.press_making import PathErrors, of_paths
-from mechanics.presses import Presses
-from mechanics.sites import LoadPatch, TouchSites, touch_sites, touch_solver
-from mechanics.tetmesh import TetMesh
-from mechanics.touch import forces_at
+from mechanics.compliance.patch import half_space_compliance
+from mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites, touch_solver
+from mechanics.contact.touch import forces_at
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.presses.making import PathErrors, of_paths
+from mechanics.presses.table import Presses
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 from reconstruct.steps.s7_modulus.modulus_field import FieldSites
 
 NU, RATE_HZ, UP = 0.49, 200.0, np.array([0.0, 0.0, 1.0])
@@ -126,5 +126,5 @@ def _solved(
     ball[:, 2] = -np.abs(ball[:, 2])
     soft = np.array([np.exp(-log_ratio(p + 0.7 * tip * ball)).mean() for p in points])
     far = (solved.far + (1 - soft)[:, None, None] * half) / soft[:, None, None]
-    sites = TouchSites(points, normals, solved.curvature, far, solved.patch_width_m, NU)
+    sites = TouchSites(points, normals, solved.curvature, far, solved.patch_width_m, NU, solved.bracing)
     return sites, 1 / soft

@@ -29,15 +29,15 @@ from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
-from mechanics.recording import recording_files
+from mechanics.recording.files import recording_files
 from palpate.batching.plan import Choice
 from palpate.batching.run import Batch, batch
 from palpate.child import module_environment
 from palpate.output import progress_bar
-from palpate.tasks.driver import Status
-from palpate.tasks.driver import run as run_graph
-from palpate.tasks.engine import executor
-from palpate.tasks.graph import Graph, Task
+from palpate.parallel.driver import Status
+from palpate.parallel.driver import run as run_graph
+from palpate.parallel.engine import executor
+from palpate.parallel.graph import Graph, Task
 
 _MANY = 10_000
 

@@ -16,8 +16,8 @@ import numpy as np
 import palpate as pp
 from benchmarks.evidence import rates
 from benchmarks.timing import table
-from mechanics.recording import Recording
-from mechanics.samples import delayed
+from mechanics.recording.recording import Recording
+from mechanics.recording.samples import delayed
 
 TIP_M, RATE_HZ, NOISE_N = 0.004, 500.0, 0.005
 STIFF = "stiffness_n_per_m"

@@ -18,12 +18,12 @@ import numpy as np
 from benchmarks._condensation import condense, inverse
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.box_mesh import box_mesh
+from mechanics.elastic.pardiso import Pardiso, available
+from mechanics.elastic.solver import Solver
 from mechanics.errors import OptionError
-from mechanics.pardiso import Pardiso, available
-from mechanics.solver import Solver
-from mechanics.tetmesh import TetMesh
-from palpate.tasks.worker import high_water_bytes
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
+from palpate.parallel.worker import high_water_bytes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

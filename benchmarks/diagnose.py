@@ -27,9 +27,9 @@ from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 from palpate.operations._to_argparse import finite
-from palpate.tasks.driver import Outcome
-from palpate.tasks.engine import run_with_bar
-from palpate.tasks.graph import Graph, Task
+from palpate.parallel.driver import Outcome
+from palpate.parallel.engine import run_with_bar
+from palpate.parallel.graph import Graph, Task
 
 
 def _add_engine(parser: argparse.ArgumentParser) -> None:

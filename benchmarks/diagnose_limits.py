@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.model import Model
-from mechanics.model_files import read_model
-from mechanics.recording import Recording, read_recording
+from mechanics.model.files import read_model
+from mechanics.model.model import Model
+from mechanics.recording.recording import Recording, read_recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -96,7 +96,7 @@ def _limits(recording: Recording, model: Model) -> dict[str, float]:
     from diagnose.search.starts import misfit_of
     from mechanics.effects.base import Role
     from mechanics.effects.registry import effects
-    from reconstruct.placing import presses_on
+    from reconstruct.presses_on_model import presses_on
 
     forward = build_forward(touches_of(presses_on(recording, model)), model)
     nuisance = NuisanceOptions()

@@ -23,7 +23,7 @@ from benchmarks.timing import table
 from benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
 from diagnose.specimen.result import FLOORS, Material
 from mechanics.errors import RecordingError
-from reconstruct.external.uniaxial import CEILING
+from reconstruct.machine_curves.uniaxial import CEILING
 from reconstruct.steps.s7_modulus.held_out import BETTER
 
 BEEF_LAYER_M, BEEF_TIP_M = 0.0154, 0.005

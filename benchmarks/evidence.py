@@ -19,8 +19,9 @@ from typing import Any
 
 from scipy.stats import binomtest
 
+from mechanics.disk.reading import read_text
+from mechanics.disk.writing import JSON, atomic_file
 from mechanics.errors import FileError
-from mechanics.files import JSON, atomic_file, read_text
 
 
 @dataclass(frozen=True)

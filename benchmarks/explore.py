@@ -26,10 +26,11 @@ from benchmarks.timing import table
 from diagnose.explore.causes import NONE
 from diagnose.explore.explorer import Explorer, State
 from diagnose.explore.goals import GoalOptions
+from mechanics.disk.scratch import cache_folder
+from mechanics.disk.store import content_key
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import PalpateError
-from mechanics.files import atomic_file, cache_folder
-from mechanics.nearest import distance, sample
-from mechanics.store import content_key
+from mechanics.shape.nearest import distance, sample
 from palpate.output import progress_bar
 from scenes.laboratory.specimen import VERSION as LABORATORY
 

@@ -18,21 +18,21 @@ from scipy.spatial import cKDTree
 from benchmarks._known_shapes import SHAPES, KnownShape
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.compression import own_blocks
-from mechanics.flat_foot import Standing
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.nearest import sample
-from mechanics.sites import patch_width, touch_solver
-from mechanics.surface_compliance import SurfaceCompliance
-from mechanics.tetmesh import TetMesh, vertex_normals
-from mechanics.true_shape import TrueShape
+from mechanics.compliance.compression import own_blocks
+from mechanics.compliance.sites import patch_width, touch_solver
+from mechanics.compliance.surface_compliance import SurfaceCompliance
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.flat_foot import Standing
+from mechanics.shape.nearest import sample
+from mechanics.shape.tetmesh import TetMesh, vertex_normals
+from mechanics.shape.true_shape import TrueShape
 from palpate.output import progress_bar
 from reconstruct.shapes.coarse_drawing import decimated
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, fill
-from render.fem import FemRenderer
-from render.surface import contact_surface
+from render.fem.renderer import FemRenderer
+from render.surface.contact_surface import contact_surface
 
 TIP_M, MODULUS_PA, NU = 0.005, 20e3, 0.49
 DEPTHS_M = (0.001, 0.003, 0.006)

@@ -19,10 +19,10 @@ from benchmarks.evidence import Figure
 from benchmarks.surface import deviation
 from benchmarks.timing import table
 from mechanics.errors import OptionError
-from mechanics.recording import Recording, read_recording
+from mechanics.recording.recording import Recording, read_recording
 from reconstruct.pipeline import reconstruct_fully
 from reconstruct.steps.s4_surface.surface import SurfaceOptions, evidence_of, reconstruct_surface
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 from render.replay import replay_error, replay_recording
 

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks._laboratory_comparison import block_shape, by_depth, compare, cylinder_shape
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.recording import read_recording
+from mechanics.recording.recording import read_recording
 from scenes.phantoms import phantom
 
 KNOWN = {

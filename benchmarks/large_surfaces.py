@@ -18,19 +18,19 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.box_mesh import box_mesh
-from mechanics.compliance import ComplianceOptions
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.nearest import closest
-from mechanics.patch import PatchSampler
-from mechanics.refine import refined_near_surface
-from mechanics.sites import LoadPatch, patch_loads, touch_sites
-from mechanics.solver import Solver
-from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
-from mechanics.tetmesh import TetMesh
-from mechanics.touch import TouchedPlaces, touch_forces
-from render.fem import FemRenderer
+from mechanics.compliance.compliance import ComplianceOptions
+from mechanics.compliance.patch import PatchSampler
+from mechanics.compliance.sites import LoadPatch, patch_loads, touch_sites
+from mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
+from mechanics.contact.touch import TouchedPlaces, touch_forces
+from mechanics.elastic.solver import Solver
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.nearest import closest
+from mechanics.shape.refine import refined_near_surface
+from mechanics.shape.tetmesh import TetMesh
+from render.fem.renderer import FemRenderer
 
 NU, MODULUS, RADIUS = 0.49, 20e3, 0.005
 

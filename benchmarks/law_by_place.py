@@ -20,15 +20,15 @@ from benchmarks._known_shapes import SHAPES, KnownShape
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import NU, TIP_M, meshed, own_compliance_near
 from benchmarks.timing import table
+from mechanics.disk.store import content_key
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import PalpateError
-from mechanics.files import atomic_file
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
 from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.store import content_key
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.tetmesh import TetMesh
 from palpate.output import progress_bar
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.force_error import law_share, place_numbers
 from scenes.laboratory.mesh import laboratory_cache
 from scenes.laboratory.specimen import Fineness, Specimen, build

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from benchmarks._recording import add_indentation, add_recording, recording_of, timed
-from mechanics.sites import touch_sites, touch_solver
+from mechanics.compliance.sites import touch_sites, touch_solver
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s6_one_d.one_d import profiles
 from reconstruct.steps.s7_modulus.modulus import fit_modulus

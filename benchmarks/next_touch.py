@@ -31,8 +31,8 @@ from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
 from diagnose.verdict.result import Diagnosis, NextTouch
 from mechanics.errors import PalpateError
-from mechanics.model_files import read_model
-from mechanics.recording import read_recording
+from mechanics.model.files import read_model
+from mechanics.recording.recording import read_recording
 from palpate.output import progress_bar
 from reconstruct.pipeline import reconstruct
 from scenes.laboratory.curves import Solving, workers_of_ours

@@ -13,13 +13,13 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.box_mesh import box_mesh
-from mechanics.inclusion import Region
-from mechanics.moduli import inclusion_ratio, mixed_ratio, share_inside
-from mechanics.patch import PatchSampler
-from mechanics.sites import patch_width
-from mechanics.solver import Solver
-from mechanics.surface_compliance import patch_blocks
+from mechanics.compliance.patch import PatchSampler
+from mechanics.compliance.sites import patch_width
+from mechanics.compliance.surface_compliance import patch_blocks
+from mechanics.elastic.inclusion import Region
+from mechanics.elastic.solver import Solver
+from mechanics.model.moduli import inclusion_ratio, mixed_ratio, share_inside
+from mechanics.shape.box_mesh import box_mesh
 
 NU = 0.49
 

@@ -30,7 +30,7 @@ from palpate.exporting.page.document import page_of
 from palpate.exporting.page.tables import greatest_depth
 from palpate.operations.load import load
 from palpate.output import progress_bar
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.press import Stroke, press
 from render.scene import in_the_air
 from tests.palpate.show.browser import Tab, a_tab, browser_found

@@ -16,10 +16,10 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.box_mesh import box_mesh
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 from scenes.phantoms import PHANTOMS, Phantom
 
 RADIUS_M, POISSON_RATIO = 5e-3, 0.49
@@ -100,7 +100,7 @@ class Place:
     """A place of a phantom, on its model's tetrahedra."""
 
     def __init__(self, name: str, near_mm: list[float] | None) -> None:
-        from mechanics.nearest import closest
+        from mechanics.shape.nearest import closest
 
         self.phantom: Phantom = PHANTOMS[name]()
         self.name = name if near_mm is None else f"{name} near {' '.join(f'{c:g}' for c in near_mm)} mm"

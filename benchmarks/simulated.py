@@ -35,15 +35,15 @@ from benchmarks._simulated_flaws import FLAWS, Block, Flaw, Given, simulated
 from benchmarks._simulated_scores import figures_of, print_cases
 from benchmarks.timing import table
 from diagnose.options import AttributionOptions, DiagnoseOptions
+from diagnose.other_simulator.forces import Forces, ForcesOptions
+from diagnose.other_simulator.pipeline import Asked, diagnose_simulated
+from diagnose.other_simulator.result import SimulatedGap
+from diagnose.other_simulator.stated import KEYS, Stated
 from diagnose.pipeline import diagnose
-from diagnose.simulated.forces import Forces, ForcesOptions
-from diagnose.simulated.pipeline import Asked, diagnose_simulated
-from diagnose.simulated.result import SimulatedGap
-from diagnose.simulated.stated import KEYS, Stated
 from diagnose.verdict.result import Diagnosis
 from mechanics.errors import OptionError
-from mechanics.model import Model
-from mechanics.recording import Recording
+from mechanics.model.model import Model
+from mechanics.recording.recording import Recording
 from palpate.output import progress_bar
 from scenes.laboratory.sealing import digest
 

@@ -27,11 +27,11 @@ from benchmarks._known_shapes import SHAPES
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import meshed
 from benchmarks.timing import table
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
 from mechanics.progress import silent
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 from render.options import DOCUMENTED, SETTINGS, RenderOptions
 from render.registry import create, simulator_names
 from render.replay import replay
@@ -213,11 +213,11 @@ class _Recorded:
     @classmethod
     def of(cls, path: Path | None, folder: Path | None, most: int) -> _Recorded:
         """The embedded recording where there is no path; reconstructed where there is no model."""
-        from diagnose.simulated.chosen import spread_out
-        from mechanics.model_files import read_model
-        from mechanics.recording import read_recording
+        from diagnose.other_simulator.presses_to_run import spread_out
+        from mechanics.model.files import read_model
+        from mechanics.recording.recording import read_recording
         from palpate.operations.reconstruct import reconstruct
-        from reconstruct.placing import presses_on
+        from reconstruct.presses_on_model import presses_on
         from scenes.embedded import embedded_recording
 
         recording = read_recording(path or embedded_recording())

@@ -22,7 +22,7 @@ from benchmarks._elastic_plane import ElasticPlane
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from devices.impedance import HandImpedance
-from devices.simulated import SPEC
+from devices.virtual_hand import SPEC
 from render.passivity import PassivityOptions
 
 AIM_J = 1e-3

@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks._surface_truth import OWN, Truth, phantom_truth, touch
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.nearest import distance, sample
+from mechanics.shape.nearest import distance, sample
 from palpate.output import progress_bar
 from reconstruct.steps.s4_surface.surface import SURFACES, SurfaceOptions, reconstruct_surface
 

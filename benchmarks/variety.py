@@ -31,9 +31,10 @@ from benchmarks.varied.draws import Draw, draw
 from benchmarks.varied.objects import solved, thing
 from benchmarks.varied.recorded import Varied, record
 from diagnose.pipeline import diagnose
+from mechanics.disk.scratch import cache_folder
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import PalpateError
-from mechanics.files import atomic_file, cache_folder
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.output import progress_bar
 from reconstruct.pipeline import reconstruct_fully
 from scenes.laboratory.curves import workers_of_ours

@@ -18,7 +18,7 @@ DEVICES: dict[str, tuple[str, str, str]] = {
     "haply": ("devices.haply", "make", "HaplyOptions"),
     "forcedimension": ("devices.forcedimension", "make", "ForceDimensionOptions"),
     "openhaptics": ("devices.openhaptics", "make", "OpenHapticsOptions"),
-    "simulated": ("devices.simulated", "SimulatedHand", "SimulatedOptions"),
+    "simulated": ("devices.virtual_hand", "SimulatedHand", "SimulatedOptions"),
     "replay": ("devices.replay", "ReplayDevice", "ReplayOptions"),
 }
 """name: (module, what makes one there, its options). A module also has `find(options=None)`."""

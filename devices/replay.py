@@ -10,7 +10,7 @@ import numpy as np
 from devices.base import Availability, Clock, DeviceSpec, OpenInWith, host_clock
 from mechanics.errors import DeviceError
 from mechanics.options import option
-from mechanics.recording import Recording, read_recording
+from mechanics.recording.recording import Recording, read_recording
 from mechanics.state import IDENTITY_QUATERNION, TipState
 
 SPEC = DeviceSpec(

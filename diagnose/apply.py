@@ -12,8 +12,8 @@ import numpy as np
 from diagnose.search.attribution import Attribution
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect, effects
-from mechanics.model import Model
-from mechanics.recording import Recording
+from mechanics.model.model import Model
+from mechanics.recording.recording import Recording
 
 REPLAYS = 2
 """Of the modulus's refit: a force goes with the modulus but for friction and adhesion."""
@@ -66,7 +66,7 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
     leave to the modulus is made good here, by the median over presses: one drag that the model misses must
     not decide. recording: read right (`corrected`). Where the replay gives no force the model stays.
     """
-    from render.fem import FemRenderer
+    from render.fem.renderer import FemRenderer
     from render.replay import replay_recording
 
     counted = model.presses.touching(recording.t)

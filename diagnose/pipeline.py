@@ -9,7 +9,13 @@ import numpy as np
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import REACH_M, reached, touches_of, unobservable_effects
 from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
+from diagnose.instrument.offsets import (
+    find_instrument_offsets,
+    read_sideways,
+    ruled_out,
+    seen_play,
+    with_move,
+)
 from diagnose.instrument.retraced import move_of
 from diagnose.instrument.rigid import rigid_of
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
@@ -22,11 +28,11 @@ from diagnose.verdict.conclusion import conclude
 from diagnose.verdict.result import Diagnosis
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effects
-from mechanics.model import Model
-from mechanics.presses import Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
 from mechanics.progress import Clock, Progress, silent
-from mechanics.recording import Recording
-from reconstruct.placing import presses_on
+from mechanics.recording.recording import Recording
+from reconstruct.presses_on_model import presses_on
 
 
 def diagnose(
@@ -88,6 +94,11 @@ def diagnose(
     seen = read_sideways(rigid, rules) & frozenset(e.name for e in tried)
     if rigid is not None and seen:
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
+    known = seen_play(rigid, excluded, rules)
+    if rigid is not None and known is not None:
+        seen |= {known.name}
+        tried = [known if e.name == known.name else e for e in tried]
+        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words_of_play))
     if not met.all():
         lost = f"presses not weighed, as the surface passes them by over {1e3 * REACH_M:g} mm: {(~met).sum()}"
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, lost))

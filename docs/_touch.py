@@ -22,7 +22,7 @@ COARSE_M = 0.014
 def write(folder: Path) -> None:
     """One page for each object, titled as its scene is."""
     from palpate.exporting.page.document import page_of
-    from render.fem import FemRenderer
+    from render.fem.renderer import FemRenderer
     from scenes.build import model_of
     from scenes.scene import load_scene
 

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import palpate as pp
-from mechanics.material import Ball
+from mechanics.model.material import Ball
 from scenes.phantoms import phantom
 
 dome = phantom("dome")

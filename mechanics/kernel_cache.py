@@ -16,7 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from mechanics.files import cache_folder
+from mechanics.disk.scratch import cache_folder
 
 PACKAGES = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
 _KEPT = 6  # folders, the newest; several checkouts and versions may take turns

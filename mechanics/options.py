@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from numbers import Real
 from typing import Any
 
+from mechanics.disk.schema import span
 from mechanics.errors import OptionError
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
-from mechanics.schema import span
 
 _BY_NAME = {
     "mesh_size_m": (5e-4, 0.2),

@@ -21,10 +21,9 @@ if TYPE_CHECKING:
     from diagnose.explore.explorer import Explorer as Explorer
     from diagnose.explore.segments import Instrument as Instrument
     from diagnose.explore.segments import Segment as Segment
-    from diagnose.simulated.result import SimulatedGap as SimulatedGap
+    from diagnose.other_simulator.result import SimulatedGap as SimulatedGap
     from diagnose.specimen.result import Material as Material
     from diagnose.verdict.result import Diagnosis as Diagnosis
-    from mechanics.calibration import Calibration as Calibration
     from mechanics.errors import CacheError as CacheError
     from mechanics.errors import ContactError as ContactError
     from mechanics.errors import DeviceError as DeviceError
@@ -39,8 +38,9 @@ if TYPE_CHECKING:
     from mechanics.errors import RecordingError as RecordingError
     from mechanics.errors import SceneError as SceneError
     from mechanics.errors import SurfaceError as SurfaceError
-    from mechanics.model import Model as Model
-    from mechanics.recording import Recording as Recording
+    from mechanics.model.model import Model as Model
+    from mechanics.recording.calibration import Calibration as Calibration
+    from mechanics.recording.recording import Recording as Recording
     from palpate.batching.summary import Batch as Batch
     from palpate.importing.imported import Imported as Imported
     from palpate.importing.opened import Opened as Opened
@@ -78,20 +78,20 @@ _OTHERS = {
     "diagnose.explore.explorer": "Explorer",
     "diagnose.explore.segments": "Instrument Segment",
     "palpate.operations._declare": "options",
-    "mechanics.recording": "Recording",
+    "mechanics.recording.recording": "Recording",
     "palpate.importing.imported": "Imported",
     "palpate.importing.opened": "Opened",
-    "mechanics.calibration": "Calibration",
+    "mechanics.recording.calibration": "Calibration",
     "diagnose.compare.before_after": "Changes",
     "reconstruct.checks.checkup": "Checkup",
     "diagnose.specimen.result": "Material",
-    "mechanics.model": "Model",
+    "mechanics.model.model": "Model",
     "reconstruct.pipeline": "Reconstruction",
     "render.replay": "ReplayResult",
     "render.press": "Curve",
     "diagnose.compare.comparison": "Comparison",
     "diagnose.verdict.result": "Diagnosis",
-    "diagnose.simulated.result": "SimulatedGap",
+    "diagnose.other_simulator.result": "SimulatedGap",
     "scenes.laboratory.simulate": "Simulation",
     "palpate.batching.summary": "Batch",
     "render.base": "Renderer",

@@ -87,8 +87,8 @@ def _run(command: argparse.ArgumentParser, name: str, words: list[str]) -> int:
     """The one place where errors become a line and an exit code."""
     import warnings
 
+    from mechanics.disk.reading import refusal
     from mechanics.errors import PalpateError, PalpateWarning
-    from mechanics.files import refusal
     from palpate.operations._run import run_command
 
     def refused(words: str) -> int:

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.options import option
 from mechanics.progress import Progress
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from mechanics.result import Result
 from palpate.operations.diagnose import AttributionOptions, diagnose
 from palpate.operations.read_recording import read_recording

@@ -11,7 +11,7 @@ import threading
 from pathlib import Path
 from typing import Any, Self
 
-from mechanics.files import JSON, atomic_file
+from mechanics.disk.writing import JSON, atomic_file
 from mechanics.progress import Remaining
 
 

@@ -58,11 +58,11 @@ def warming_up(processes_of: Sequence[Sequence[str]] = BESIDE_ONE_ANOTHER) -> It
 def block_renderer(name: str = "fem") -> Any:
     """A renderer of a block that is condensed at once."""
     import render
-    from mechanics.box_mesh import box_mesh
-    from mechanics.material import Material
-    from mechanics.model import Model, Support, Tool
-    from mechanics.press_making import of_places
-    from mechanics.presses import FITS
+    from mechanics.model.material import Material
+    from mechanics.model.model import Model, Support, Tool
+    from mechanics.presses.making import of_places
+    from mechanics.presses.table import FITS
+    from mechanics.shape.box_mesh import box_mesh
 
     mesh = box_mesh((2, 2, 2), (_SIZE_M,) * 3).quadratic()
     up = np.array([0.0, 0.0, 1.0])
@@ -95,7 +95,7 @@ def _replay(renderer: Any) -> None:
 def _tick(renderer: Any) -> None:
     """Compile the servo's loop for this renderer's kind, without its step."""
     from devices.safety import SafetyOptions, safety_parameters
-    from devices.simulated import SPEC
+    from devices.virtual_hand import SPEC
     from palpate.servo.layout import total_bytes, views
     from palpate.servo.loop import compile_loop
     from palpate.servo.tick import OUT_WIDTH, TickParameters, put_pose, take_command, tick_arrays

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
 from mechanics.options import option
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from mechanics.progress import Clock, Progress, part
-from mechanics.sites import TouchSites, touch_sites, touch_solver
-from mechanics.tetmesh import TetMesh
-from reconstruct.geometry.placed import Placed
+from mechanics.shape.tetmesh import TetMesh
+from reconstruct.geometry.in_device_frame import Placed
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s2_base.outline import BoundaryOptions

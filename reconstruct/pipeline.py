@@ -10,23 +10,23 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.compliance.sites import TouchSites
+from mechanics.contact.linear_range import linear_range
+from mechanics.disk.toml_text import plain
 from mechanics.errors import ContactError, NoBaseError, OptionError
-from mechanics.linear_range import linear_range
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.model_files import read_model
+from mechanics.model.files import read_model
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
 from mechanics.progress import Clock, Progress, part, silent
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
-from mechanics.recording import Recording, base_model_of
+from mechanics.recording.recording import Recording, base_model_of
 from mechanics.result import Result
-from mechanics.sites import TouchSites
-from mechanics.toml_text import plain
 from reconstruct.checks.finding import Finding
 from reconstruct.checks.outcome import outcome_of
 from reconstruct.checks.registry import Checkup
+from reconstruct.geometry.in_device_frame import Placed, nowhere
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.known_shape import place
-from reconstruct.geometry.placed import Placed, nowhere
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.methods import BY_NAME, Body, Fitted, Method
 from reconstruct.methods import ReconstructOptions as ReconstructOptions

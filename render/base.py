@@ -16,8 +16,8 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.kernels import kept, loop_kernel, pointer
-from mechanics.model import Model
-from render.surface import ContactSurface
+from mechanics.model.model import Model
+from render.surface.contact_surface import ContactSurface
 
 
 class State(NamedTuple):
@@ -191,7 +191,7 @@ def _follow(step, parameters, state, steps_s, path, forces):
 
 
 class Grip(NamedTuple):
-    """The part of a state that says where each tip is held (render.contact): m tips.
+    """The part of a state that says where each tip is held (render.surface.contact): m tips.
 
     triangle: (m,) of the contact surface, -1 in air; weights: (m, 3) barycentric. armed: (m,) the tip has
     been outside, so an entry counts. previous: (m, 3) m, where the sweep for the next entry starts, and

@@ -13,7 +13,7 @@ import numpy as np
 from mechanics.effects.laws_along_path import PathNumbers, path_numbers
 from mechanics.effects.registry import effects
 from mechanics.effects.settings import STICKS, Touch
-from mechanics.model import Model
+from mechanics.model.model import Model
 from render.options import RenderOptions
 
 STICKING = 1.0

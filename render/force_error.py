@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.edges import nearness
+from mechanics.contact.edges import nearness
 from render.base import Renderer
-from render.felt_surface import felt_surface
-from render.fem import FemRenderer
-from render.snapping import ONSET_NOISE_M
+from render.fem.renderer import FemRenderer
+from render.surface.felt_surface import felt_surface
+from render.surface.snapping import ONSET_NOISE_M
 
 FLOOR, BENT_SHARE, SIDEWAYS_SHARE = 0.03, 0.015, 0.08
 RIM_SHARE, BASE_SHARE = 0.25, 1.2
@@ -83,7 +83,7 @@ def place_numbers(
 ) -> np.ndarray:
     """(4, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
     radius; how far a push along the normal moves the surface sideways, as compliance times the tip's radius
-    and the modulus; how near a rim and how near the base it is (mechanics.edges.nearness)."""
+    and the modulus; how near a rim and how near the base it is (mechanics.contact.edges.nearness)."""
     surface, mesh, parameters = renderer.contact.arrays, renderer.model.mesh, renderer.parameters
     points, normals, far = surface.vertices[vertices], surface.normals[vertices], parameters.far[vertices]
     along = np.einsum("vab,vb->va", far, normals)

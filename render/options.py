@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mechanics.dent import dent_laws
+from mechanics.contact.dent import dent_laws
 from mechanics.errors import OptionError
 from mechanics.options import option
 

@@ -8,22 +8,27 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechanics.disk.reading import read_text
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import OptionError, RecordingError
-from mechanics.files import Kind, atomic_file, read_text
 from mechanics.quantities import TIP_RADIUS
 from mechanics.result import Result
 from render.base import Renderer
-from render.bvh import STACK, closest_triangle
 from render.force_error import error_figures, force_errors
 from render.scene import TouchScene, scene_of
-from render.surface import SurfaceArrays
-from render.walking import foot
+from render.surface.bvh import STACK, closest_triangle
+from render.surface.contact_surface import SurfaceArrays
+from render.surface.walking import foot
+
+if TYPE_CHECKING:
+    from render.exact import ExactPlaces, SolvedPlace
 
 COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
 CURVE = Kind("a curve of palpate press", (",".join(COLUMNS).encode(),))
@@ -40,7 +45,8 @@ class Curve(Result):
     tool.
 
     Depth is travel along -n since first touch, 0 before it. normal: (3,) outward at first touch; renderer,
-    tip_radius_m: what it was pressed with; None for a curve that was read. `plot`: force along the normal,
+    tip_radius_m: what it was pressed with; None for a curve that was read. exact: the place as it was solved,
+    where the force is by that. `plot`: force along the normal,
     and its length, over depth. `show`: the object as it is deformed at the deepest, with tip and force.
     """
 
@@ -51,6 +57,7 @@ class Curve(Result):
     normal: np.ndarray | None = None
     renderer: Renderer | None = None
     tip_radius_m: float | None = None
+    exact: SolvedPlace | None = None
 
     @cached_property
     def error_figures(self) -> dict[str, float]:
@@ -166,6 +173,22 @@ def press(
     force = scene.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), step_s))
     depth = np.maximum(along * steepness, 0.0)
     return Curve(t, position, depth, force[:, 0], normal, scene.renderer, radius)
+
+
+def solved(curve: Curve, exact: ExactPlaces) -> Curve:
+    """The curve with its place solved. Raises OptionError where the solver finds no equilibrium there."""
+    normal, felt = np.asarray(curve.normal), int(np.argmax(curve.depth > 0))
+    along = curve.position[felt] - curve.position[felt - 1]
+    along /= -(along @ normal)
+    point = curve.position[felt] - curve.depth[felt] * along - exact.tip_m * normal
+    place = exact(point, normal, float(curve.depth.max()))
+    if place is None:
+        raise OptionError(
+            "this press cannot be solved (no equilibrium, or it meets the support): press less deep, or "
+            "leave out --exact"
+        )
+    force = curve.force * place.factor(curve.depth)[:, None]
+    return replace(curve, force=force, exact=place)
 
 
 def first_touch(

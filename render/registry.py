@@ -10,15 +10,15 @@ from mechanics.progress import Progress, silent
 from render.options import RenderOptions
 
 if TYPE_CHECKING:
-    from mechanics.model import Model
+    from mechanics.model.model import Model
     from render.base import Renderer
 
 RENDERERS = {
-    "fem": "render.fem",
-    "kelvin-voigt": "render.one_d",
-    "hunt-crossley": "render.one_d",
-    "hunt-crossley-undamped": "render.one_d",
-    "hunt-crossley-kh": "render.one_d",
+    "fem": "render.fem.renderer",
+    "kelvin-voigt": "render.one_d.renderer",
+    "hunt-crossley": "render.one_d.renderer",
+    "hunt-crossley-undamped": "render.one_d.renderer",
+    "hunt-crossley-kh": "render.one_d.renderer",
 }
 """Our own."""
 

@@ -5,20 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import OptionError
-from mechanics.files import Kind, atomic_file
-from mechanics.model import Model
-from mechanics.presses import LEAD_S, Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import LEAD_S, Presses
 from mechanics.progress import Progress, Remaining, silent
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
+from mechanics.recording.samples import runs
 from mechanics.result import Result
-from mechanics.samples import runs
 from render.base import Renderer
 from render.force_error import error_figures, force_errors
 from render.scene import TouchScene, scene_of
+
+if TYPE_CHECKING:
+    from render.exact import ExactReplay
 
 FORCES = Kind("a file of palpate replay", (b"t,fx,fy,fz",))
 _CHUNK, _TOLD = 4000, 100
@@ -135,8 +139,9 @@ def replay_error(recording: Recording, presses: Presses, forces: np.ndarray) -> 
 class ReplayResult(Result, ReplayError):
     """Forces of a renderer along a recorded path, against those measured.
 
-    t: (n,) s. force_n: (n, 3) N rendered, on the tool, device frame. used: the renderer itself. `plot`: both
-    forces over time. `show`: the object, each touch coloured by its rms error.
+    t: (n,) s. force_n: (n, 3) N rendered, on the tool, device frame. used: the renderer itself. exact: the
+    touched places as they were solved, where the forces are by that. `plot`: both forces over time. `show`:
+    the object, each touch coloured by its rms error.
     """
 
     recording: Recording
@@ -145,6 +150,7 @@ class ReplayResult(Result, ReplayError):
     t: np.ndarray
     force_n: np.ndarray
     used: Renderer | None = None
+    exact: ExactReplay | None = None
 
     @property
     def error_n(self) -> np.ndarray:

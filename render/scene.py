@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from render.base import Renderer
 from render.support import (
     SupportOptions,

@@ -15,7 +15,7 @@ from mechanics.kernels import inner, kernel
 from mechanics.options import check_ranges, option
 
 if TYPE_CHECKING:
-    from mechanics.model import Model
+    from mechanics.model.model import Model
 
 CREEP_M_PER_S = 0.005
 """Below this speed friction falls off linearly, so that it does not chatter at rest."""

@@ -17,17 +17,20 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.disk.reading import reading
+from mechanics.disk.scratch import cache_folder
+from mechanics.disk.surface_files import surface_of
+from mechanics.disk.writing import atomic_folder
 from mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
-from mechanics.files import atomic_folder, cache_folder, reading
-from mechanics.flat_foot import Standing, standing
-from mechanics.material import Ball, Material
-from mechanics.model import Model, Support, Tool
-from mechanics.model_files import MODEL, read_model, write_model
+from mechanics.model.files import MODEL, read_model, write_model
+from mechanics.model.material import Ball, Material
+from mechanics.model.model import Model, Support, Tool
 from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
-from mechanics.recording import read_recording, recording_files
-from mechanics.surface_files import surface_of
-from mechanics.true_shape import TrueShape
+from mechanics.recording.files import recording_files
+from mechanics.recording.recording import read_recording
+from mechanics.shape.flat_foot import Standing, standing
+from mechanics.shape.true_shape import TrueShape
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
 from scenes.scene import Scene, ball_of

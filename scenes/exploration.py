@@ -12,9 +12,9 @@ import numpy as np
 
 from devices.intention import Path
 from mechanics.errors import SceneError
-from mechanics.model import Model
-from mechanics.nearest import closest
+from mechanics.model.model import Model
 from mechanics.options import option
+from mechanics.shape.nearest import closest
 from scenes.virtual_presses import spread_places
 
 ANGLES = 180

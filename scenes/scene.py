@@ -14,7 +14,7 @@ A TOML file whose keys carry their units. Allowed tables and keys:
     [device]     axes, motion_scale, force_scale, clutch_button, reach_m
     [render]     renderer, beside, colour, friction
 
-Paths are relative to the scene's file and stay in its folder (mechanics.files.named_in).
+Paths are relative to the scene's file and stay in its folder (mechanics.disk.reading.named_in).
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from pathlib import Path
 from typing import Any
 
 from devices.mapper import MapperOptions, axis_matrix
+from mechanics.disk.reading import named_in, read_toml
+from mechanics.disk.schema import Key, Listed, Schema, check_table
+from mechanics.disk.surface_files import SUFFIXES, is_surface_file
 from mechanics.errors import OptionError, SceneError
-from mechanics.files import named_in, read_toml
-from mechanics.material import BALL, Ball
+from mechanics.model.material import BALL, Ball
 from mechanics.names import unknown
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
-from mechanics.schema import Key, Listed, Schema, check_table
-from mechanics.surface_files import SUFFIXES, is_surface_file
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.phantoms import PHANTOMS, Region
 
@@ -81,8 +81,8 @@ class Scene:
 
     young_modulus_pa, poisson_ratio: None keeps the object's own. inclusions: None keeps the phantom's own.
     beside: a second renderer that the same tip drives, '' for none. friction: Coulomb coefficient, None
-    sticks. unit, up, sink_m: how a mesh's file is meant (mechanics.flat_foot). mesh_size_m: None takes 10 mm,
-    less for a small object. find: the inclusions are hidden, to be found.
+    sticks. unit, up, sink_m: how a mesh's file is meant (mechanics.shape.flat_foot). mesh_size_m: None takes
+    10 mm, less for a small object. find: the inclusions are hidden, to be found.
     """
 
     name: str

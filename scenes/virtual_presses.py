@@ -1,7 +1,7 @@
 """Palpations of a model that nobody palpated, so that 1D renderers have parameters to interpolate.
 
-Straight presses along the inward normal at spread places, force from the model itself (mechanics.touch), then
-the 1D models fitted to them as to recorded ones.
+Straight presses along the inward normal at spread places, force from the model itself
+(mechanics.contact.touch), then the 1D models fitted to them as to recorded ones.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
+from mechanics.contact.touch import forces_at
 from mechanics.errors import SceneError
-from mechanics.model import Model
-from mechanics.press_making import of_paths
+from mechanics.model.model import Model
+from mechanics.presses.making import of_paths
 from mechanics.progress import Progress, silent
-from mechanics.sites import LoadPatch, touch_sites, touch_solver
-from mechanics.touch import forces_at
 
 SITES = 32
 DEPTH_M = 0.005

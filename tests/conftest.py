@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,12 +14,27 @@ import pytest
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
+# Modules are compiled, and their assertions rewritten, once for all workers and children, not once in each.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 import mechanics  # noqa: E402, F401  where compiled kernels are kept, before a test decorates one
 
-from .support.once import compile_one_at_a_time  # noqa: E402
+from .support.once import compile_one_at_a_time, one_at_a_time  # noqa: E402
 
-if "PYTEST_XDIST_WORKER" in os.environ and os.name == "posix":
+WORKER = "PYTEST_XDIST_WORKER" in os.environ and os.name == "posix"
+if WORKER:
     compile_one_at_a_time()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Workers read the tests by turns: what the first has rewritten, the others load."""
+    if not WORKER:
+        return (yield)
+    with one_at_a_time(Path(__file__)):
+        return (yield)
+
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 

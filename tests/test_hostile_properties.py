@@ -17,12 +17,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks._servo_load import block_model
-from mechanics import recording as of_recording
+from mechanics.disk.schema import Key
 from mechanics.errors import DeviceError, ModelError, PalpateError, RecordingError, SceneError
-from mechanics.model_files import SCHEMA as OF_MODEL
-from mechanics.model_files import read_model, write_model
-from mechanics.recording import read_recording
-from mechanics.schema import Key
+from mechanics.model.files import SCHEMA as OF_MODEL
+from mechanics.model.files import read_model, write_model
+from mechanics.recording import recording as of_recording
+from mechanics.recording.recording import read_recording
 from scenes.scene import SCHEMA as OF_SCENE
 from scenes.scene import load_scene
 

@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 from pypardiso import PyPardisoSolver
 
-from mechanics.dent import dent_law, effective_radius, grid
-from mechanics.files import atomic_file
-from mechanics.patch import half_space_compliance
+from mechanics.compliance.patch import half_space_compliance
+from mechanics.contact.dent import dent_law, effective_radius, grid
+from mechanics.disk.writing import atomic_file
 from tools.dent_table import COARSE, Grading, HalfSpace, Press, lagrange, rule
 from tools.script import script
 
 PATCH_WIDTH = 0.8
-"""Of the Gaussian patch, in tip radii: 4 mm under a tip of 5 (mechanics.sites.PATCH_WIDTH_M)."""
+"""Of the Gaussian patch, in tip radii: 4 mm under a tip of 5 (mechanics.compliance.sites.PATCH_WIDTH_M)."""
 REACH = 6.0
 """Tip radii over which a bump falls off."""
 BENDS = (-0.2, -0.1, 0.1, 0.2)
@@ -35,7 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--bends", type=float, nargs="+", default=list(BENDS), help="curvature x tip radius")
     parser.add_argument("--reach", type=float, default=REACH, help="of a bump, in tip radii")
     parser.add_argument("--until", type=float, default=1.9, help="greatest depth over the tip's radius")
-    parser.add_argument("-o", "--output", help="CSV of dent / effective radius and g (mechanics.dent)")
+    parser.add_argument(
+        "-o", "--output", help="CSV of dent / effective radius and g (mechanics.contact.dent)"
+    )
 
 
 class Bump(HalfSpace):

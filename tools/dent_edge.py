@@ -1,9 +1,8 @@
 """Recompute what the load patch misses beside a sharp rim and above the base, from presses that are solved.
 
 Bodies of unit modulus stand on their base: a tip of 5 mm presses, sticking, into the top of prisms beside a
-rim, into their flanks above the base, and into flat layers (mechanics.press_solver, neo-Hookean). At each
-depth the dent's table and the far field under the patch leave something of the displacement; over the force
-it is a compliance. The amounts of mechanics.edges are fitted to it, by what they change of the force.
+rim, into their flanks above the base, and into flat layers (mechanics.press_solver, neo-Hookean). The amounts
+of mechanics.contact.edges that are not zero are fitted to the logarithm of the forces, through the touch law.
 """
 
 from __future__ import annotations
@@ -14,28 +13,30 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from benchmarks.felt_surface import meshed
-from mechanics.box_mesh import box_mesh
-from mechanics.dent import dent_law, grid
-from mechanics.edges import fitted, laid
-from mechanics.files import atomic_file
-from mechanics.patch import usual_width
+from mechanics.compliance.patch import usual_width
+from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from mechanics.contact.edges import fitted, laid
+from mechanics.contact.touch import TouchedPlaces, touch_forces
+from mechanics.disk.writing import atomic_file
 from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 from tools.script import script
 
 RADIUS_M, NU = 5e-3, 0.49
 HEIGHT_M, LENGTH_M, WIDTH_M = 0.040, 0.080, 0.080
-DEPTHS_M = 1e-3 * np.array([1.0, 2.0, 3.5, 5.0])
+DEPTHS_M = 1e-3 * np.array([1.0, 2.0, 3.5, 5.0, 6.5, 8.0])
 ANGLES = (90.0, 120.0)
-LAYERS_M = (0.006, 0.010)
+LAYERS_M = (0.010, 0.015)
 FROM_RIM_M = 1e-3 * np.array([1.5, 2.5, 3.5, 5.0, 8.0])
-FROM_BASE_M = 1e-3 * np.array([5.0, 6.5, 8.5])
+FROM_BASE_M = 1e-3 * np.array([6.5, 8.5, 11.0, 15.0])
 DEEPEST_OF_LAYER = 0.6
-LEAST = 0.5
-"""Of a place's whole compliance times the patch's width, by which what is left is divided."""
+STEPS = 61
+ZONE = 6.0
+"""Of finite strain, contact radii: 3.5 are 1.1 % too soft 8 mm deep (mechanics.press_solver)."""
 
 
 @dataclass(frozen=True)
@@ -82,74 +83,102 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--angles", type=float, nargs="+", default=list(ANGLES), help="of the rims, degrees")
     parser.add_argument("--layers", type=float, nargs="*", default=list(LAYERS_M), help="how thick, m")
     parser.add_argument("--seed", type=int, default=0, help="of where along the edges (default: 0)")
-    parser.add_argument("-o", "--output", help="CSV of widths and amounts (mechanics.edges)")
+    parser.add_argument("-o", "--output", help="CSV of widths and amounts (mechanics.contact.edges)")
 
 
-def left_over(
-    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, depths: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compliance that the law lacks, (places, depths), and the whole; what unit amounts add (places, g); all
-    times the patch's width. NaN past the deepest, and where there is no equilibrium."""
+@dataclass(frozen=True)
+class Pressed:
+    """A place that was pressed. depths: (d,) m. force: (d,) m^2 along the normal, nan where there was no
+    equilibrium. far: (3, 3) 1/m, under the patch alone. laid: (g,) 1/m, of mechanics.contact.edges over the
+    patch's width."""
+
+    normal: np.ndarray
+    depths: np.ndarray
+    force: np.ndarray
+    far: np.ndarray
+    laid: np.ndarray
+
+    def by_law(self, amounts: np.ndarray, bracing: np.ndarray) -> np.ndarray:
+        """(d,) m^2: the touch law's with these amounts (g,)."""
+        way = np.unique(np.concatenate([np.linspace(0.0, self.depths[-1], STEPS), self.depths]))
+        along = np.outer(self.normal, self.normal)
+        place = TouchedPlaces(
+            self.normal[None], (self.far + self.laid @ amounts * along)[None], 0.0, self.laid @ bracing
+        )
+        force = touch_forces(
+            -way[:, None] * self.normal, np.array([0, len(way)]), place,
+            young_modulus_pa=1.0, poisson_ratio=NU, tip_radius_m=RADIUS_M, law="neo-hookean",
+        )  # fmt: skip
+        return np.interp(self.depths, way, force @ self.normal)
+
+
+def pressed(mesh: TetMesh, points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> list[Pressed]:
+    """Solve the places (k, 3) of a mesh."""
     solver, width = touch_solver(mesh, NU), usual_width(mesh)
     patch = LoadPatch(patch_width(solver.mesh))
     sites = touch_sites(mesh, points, normals, NU, solver=solver, curvature=0.0, patch=patch)
     truth = PressSolver(
         mesh.linear(), None, young_modulus_pa=1.0, poisson_ratio=NU, tip_radius_m=RADIUS_M,
-        options=PressOptions(coupled=True),
+        options=PressOptions(coupled=True, zone=ZONE),
     )  # fmt: skip
-    law, depth = dent_law("neo-hookean", NU), grid() * RADIUS_M
-    table = law.force(depth, 1.0, NU, RADIUS_M)
-    missed, whole = np.full((2, len(points), len(DEPTHS_M)), np.nan)
+    near, found = laid(mesh, points, normals) / width, []
     for k, (point, normal) in enumerate(zip(points, normals, strict=True)):
-        force = truth.press(point, normal, depths).force
-        along, of_patch = force @ normal, force @ (sites.far[k] @ normal)
-        missed[k, : len(depths)] = width * (depths - np.interp(along, table, depth) - of_patch) / along
-        whole[k, : len(depths)] = width * depths / along
-        print(" ".join(f"{value:8.4f}" for value in (*(1e3 * point), *missed[k], *whole[k])), flush=True)
-    return missed, whole, laid(mesh, points, normals)
+        force = truth.press(point, normal, depths).force @ normal
+        found.append(Pressed(normal, depths, force, sites.far[k], near[k]))
+        print(" ".join(f"{value:8.3f}" for value in (*(1e3 * point), *(1e6 * force))), flush=True)
+    return found
 
 
-def fit(missed: np.ndarray, whole: np.ndarray, unit: np.ndarray) -> tuple[np.ndarray, float, float]:
-    """(g,) amounts, and rms of what is left of the force without and with them. What places far from any
-    edge lack at a depth is no matter of edges: a constant a depth is fitted beside."""
-    some, depth = np.nonzero(np.isfinite(missed))
-    weight = 1 / np.maximum(whole[some, depth], LEAST)
-    columns = np.hstack([unit[some], np.eye(missed.shape[1])[depth]]) * weight[:, None]
-    target = missed[some, depth] * weight
-    found = np.linalg.lstsq(columns, target, rcond=None)[0]
-    plain = target - columns[:, unit.shape[1] :] @ found[unit.shape[1] :]
-    left = target - columns @ found
-    before, after = (float(np.sqrt((part**2).mean())) for part in (plain, left))
-    return found[: unit.shape[1]], before, after
+def fit(found: list[Pressed]) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """(g,) compliances and bracing, and rms of what is left of the force without and with them. What places
+    far from any edge lack at a depth is no matter of edges: a constant a depth is fitted beside."""
+    given = np.stack(fitted()[2:])
+    free = given != 0
+    column = np.concatenate([np.searchsorted(DEPTHS_M, one.depths) for one in found])
+    known = np.isfinite(np.concatenate([one.force for one in found]))
+
+    def left(numbers: np.ndarray) -> np.ndarray:
+        amounts = np.zeros_like(given)
+        amounts[free] = numbers[: free.sum()]
+        off = np.concatenate([np.log(one.by_law(*amounts) / one.force) for one in found])
+        return (off - numbers[free.sum() :][column])[known]
+
+    start = np.zeros(free.sum() + len(DEPTHS_M))
+    plain = left(start)
+    plain -= (np.bincount(column[known], plain) / np.bincount(column[known]))[column[known]]
+    solved = least_squares(left, start, x_scale="jac")
+    given[free] = solved.x[: free.sum()]
+    before, after = (float(np.sqrt((part**2).mean())) for part in (plain, solved.fun))
+    return given[0], given[1], before, after
 
 
 def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
     """Solve, print, fit, and write."""
-    found = []
+    found: list[Pressed] = []
     for angle in arguments.angles:
         prism = Prism(angle)
-        found.append(left_over(meshed(prism, 0.01), *prism.places(arguments.seed), DEPTHS_M))
+        found += pressed(meshed(prism, 0.01), *prism.places(arguments.seed), DEPTHS_M)
     for height in arguments.layers:
         mesh = box_mesh((8, 8, max(1, round(height / 5e-3))), (LENGTH_M, WIDTH_M, height))
         depths = DEPTHS_M[DEPTHS_M < DEEPEST_OF_LAYER * height]
-        found.append(left_over(mesh, np.array([[0.003, 0.004, height]]), np.array([[0, 0, 1.0]]), depths))
-    missed, whole, unit = (np.vstack(part) for part in zip(*found, strict=True))
-    amounts, before, after = fit(missed, whole, unit)
-    widths, over_base, _ = fitted()
+        found += pressed(mesh, np.array([[0.003, 0.004, height]]), np.array([[0, 0, 1.0]]), depths)
+    amounts, bracing, before, after = fit(found)
+    widths, over_base, *_ = fitted()
     print(
-        f"amounts {np.round(amounts, 4)}; {100 * before:.1f} % of the force without, {100 * after:.1f} % with"
+        f"amounts {np.round(amounts, 4)}, bracing {np.round(bracing, 4)}; {100 * before:.1f} % of the force "
+        f"without, {100 * after:.1f} % with"
     )
     if arguments.output:
         header = (
             f"prisms with rims of {arguments.angles} degrees and flanks above the base, layers of "
             f"{arguments.layers} m,\ntip {RADIUS_M} m, nu {NU}, neo-Hookean, sticking sphere; "
             "made by 'python -m tools.dent_edge'\nwidth over the patch's, 0 along rims or 1 over the base, "
-            "amount"
+            "compliance, bracing"
         )
-        table = np.column_stack([widths, over_base, amounts])
+        table = np.column_stack([widths, over_base, amounts, bracing])
         with atomic_file(Path(arguments.output)) as temporary:
-            np.savetxt(temporary, table, fmt=["%.2f", "%d", "%.4f"], delimiter=",", header=header)
-    return {"amounts": amounts, "left_without": before, "left": after}
+            np.savetxt(temporary, table, fmt=["%.2f", "%d", "%.4f", "%.4f"], delimiter=",", header=header)
+    return {"amounts": amounts, "bracing": bracing, "left_without": before, "left": after}
 
 
 if __name__ == "__main__":

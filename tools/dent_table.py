@@ -19,10 +19,10 @@ import numpy as np
 import scipy.sparse as sp
 from pypardiso import PyPardisoSolver
 
-from mechanics.dent import dent_law, grid
+from mechanics.contact.dent import dent_law, grid
+from mechanics.disk.writing import atomic_file
 from mechanics.effects.strain_stiffening import hardening
-from mechanics.elasticity import lame_parameters
-from mechanics.files import atomic_file
+from mechanics.elastic.elasticity import lame_parameters
 from tools.script import script
 
 
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--element", type=float, default=0.06, help="smallest element over the tip's radius")
     parser.add_argument("--until", type=float, default=2.0, help="greatest depth over the tip's radius")
-    parser.add_argument("-o", "--output", help="CSV of depth / R, c and alpha (mechanics.dent)")
+    parser.add_argument("-o", "--output", help="CSV of depth / R, c and alpha (mechanics.contact.dent)")
 
 
 def graded(fine: float, fine_until: float, ratio: float, end: float) -> np.ndarray:
@@ -344,7 +344,7 @@ def press_curve(
 
 
 def smooth_table(rows: np.ndarray) -> np.ndarray:
-    """(k, 4) depth / R, c, alpha, tau, as mechanics.dent reads them, from the rows of `press_curve`.
+    """(k, 4) depth / R, c, alpha, tau, as mechanics.contact.dent reads them, from the rows of `press_curve`.
 
     Ring by ring the curve wavers by half a percent (a mid-side ring touches late). Its ratio to Sneddon's
     frictionless sphere is smooth and goes to 1 at no depth: a quartic in the square root of the depth is
@@ -429,7 +429,7 @@ def run(arguments: argparse.Namespace) -> dict:
 
 
 def write_table(path: Path, table: np.ndarray, arguments: argparse.Namespace) -> None:
-    """Write the CSV that mechanics.dent reads, with its provenance in the header."""
+    """Write the CSV that mechanics.contact.dent reads, with its provenance in the header."""
     header = (
         f"{arguments.law} (c20/c10 {arguments.stiffening}) half-space under a sticking sphere, "
         f"Poisson's ratio {arguments.poisson_ratio},\npressed to {arguments.until} R, smallest element "

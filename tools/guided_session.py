@@ -24,7 +24,7 @@ from devices.registry import DeviceChoice
 from diagnose.explore.explorer import Explorer
 from diagnose.explore.goals import GoalOptions
 from diagnose.explore.segments import Instrument
-from mechanics.files import PNG, atomic_file
+from mechanics.disk.writing import PNG, atomic_file
 from palpate.window.guide import Guide
 from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.window import TouchWindow

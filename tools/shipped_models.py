@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance import compliance_key, load_or_condense
-from mechanics.model import Model
-from mechanics.model_files import write_model
-from render.felt_surface import with_own_stiffness
-from render.fem import FemRenderer
+from mechanics.compliance.compliance import compliance_key, load_or_condense
+from mechanics.model.files import write_model
+from mechanics.model.model import Model
+from render.fem.renderer import FemRenderer
+from render.surface.felt_surface import with_own_stiffness
 from scenes.build import folder_name, model_of
 from scenes.scene import FOLDER as SCENES
 from scenes.scene import read_scene

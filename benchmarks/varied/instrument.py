@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.varied.draws import Draw
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.frame import quaternions
 from scenes.laboratory.hand import band_noise

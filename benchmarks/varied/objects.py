@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.varied.shapes import shape
-from mechanics.nearest import first_hits
 from mechanics.progress import Progress, silent
+from mechanics.shape.nearest import first_hits
 from scenes.laboratory.curves import Solving
 from scenes.laboratory.paths import touch_forces
 from scenes.laboratory.presses import Touch, sites

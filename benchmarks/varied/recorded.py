@@ -12,8 +12,8 @@ from benchmarks.varied.draws import Draw
 from benchmarks.varied.instrument import logged, weighed
 from benchmarks.varied.objects import Thing, thing
 from benchmarks.varied.writing import object_name, write
-from mechanics.recording import Recording, read_recording
-from mechanics.segments import Segment
+from mechanics.recording.recording import Recording, read_recording
+from mechanics.recording.segments import Segment
 from scenes.laboratory.curves import ALONE, Solving
 from scenes.laboratory.hand import HandOptions, cohort_hand
 from scenes.laboratory.motion import Motion

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.varied.draws import Draw
-from mechanics.files import atomic_file
-from mechanics.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS, Recording, description_table
-from mechanics.toml_text import dump_toml
+from mechanics.disk.toml_text import dump_toml
+from mechanics.disk.writing import atomic_file
+from mechanics.recording.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS, Recording, description_table
 
 SCRIPTS = (
     ("silicone sample", "recorded in the morning", "temperature"),

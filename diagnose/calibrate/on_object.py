@@ -23,7 +23,6 @@ from diagnose.search.evidence import Search
 from diagnose.search.fit import Fit, bounds_of
 from diagnose.search.intervals import covariance
 from diagnose.search.shape import site_stiffness_sd
-from mechanics.calibration import Calibration
 from mechanics.effects.backlash import EFFECT as PLAY
 from mechanics.effects.base import Effect
 from mechanics.effects.finite_strain import EFFECT as FINITE
@@ -33,10 +32,11 @@ from mechanics.effects.time_delay import EFFECT as DELAY
 from mechanics.effects.tool_compliance import EFFECT as SPRING
 from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from mechanics.errors import OptionError
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.progress import Progress, silent
-from mechanics.recording import Recording
-from reconstruct.placing import presses_on
+from mechanics.recording.calibration import Calibration
+from mechanics.recording.recording import Recording
+from reconstruct.presses_on_model import presses_on
 
 TRUSTED = ("tip", "gain")
 FITTED = (SPRING, GAIN, DELAY, PLAY)

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.calibration import Calibration
 from mechanics.errors import ContactError
-from mechanics.recording import Recording
-from mechanics.samples import delayed
+from mechanics.recording.calibration import Calibration
+from mechanics.recording.recording import Recording
+from mechanics.recording.samples import delayed
 from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s3_contacts.contacts import Exploration
 

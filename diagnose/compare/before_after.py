@@ -17,8 +17,8 @@ import numpy as np
 from diagnose.verdict.result import Diagnosis
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect
-from mechanics.model import Model
-from mechanics.recording import Recording
+from mechanics.model.model import Model
+from mechanics.recording.recording import Recording
 from mechanics.result import Result
 
 _95 = 1.96

@@ -16,16 +16,16 @@ import numpy as np
 
 from diagnose.compare.models import RIVALS, Fem, Prepared, predicted, prepare, rms
 from diagnose.compare.regions import Region, regions
+from mechanics.compliance.smooth_field import SmoothField
 from mechanics.errors import ContactError
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.options import option
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from mechanics.progress import Progress, part, silent
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from mechanics.result import Result
-from mechanics.smooth_field import SmoothField
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-from reconstruct.placing import presses_on
+from reconstruct.presses_on_model import presses_on
 
 Predict = Callable[[np.ndarray, np.ndarray], tuple[dict[str, np.ndarray], Fem]]
 """(training presses, held-out presses) to each model's forces (rows of the held-out, 3), N, and the FEM."""

@@ -5,7 +5,7 @@
   smooth field of the modulus where they ask for one (reconstruct.steps.s7_modulus.modulus_field).
 - fem-homogeneous: the same with one modulus whatever they ask for.
 - kelvin-voigt, hunt-crossley: each training press fitted by itself, eq. (1) and (2) of Goksel et al., then
-  interpolated to the held-out place by radial basis functions (mechanics.one_d_laws), force along the
+  interpolated to the held-out place by radial basis functions (mechanics.model.one_d_laws), force along the
   normal.
 """
 
@@ -17,18 +17,18 @@ from functools import partial
 
 import numpy as np
 
-from mechanics.model import Model
-from mechanics.one_d_laws import LAWS as ONE_D_LAWS
-from mechanics.one_d_laws import RIVALS as RIVALS
-from mechanics.one_d_laws import Law, forces_of, spread_law
-from mechanics.press_making import of_paths
-from mechanics.press_sites import sites_of
-from mechanics.pressed_places import UNIFORM, Places
-from mechanics.presses import MARGIN_S, Presses
+from mechanics.compliance.pressed_places import UNIFORM, Places
+from mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
+from mechanics.compliance.smooth_field import SmoothField
+from mechanics.contact.touch import forces_at
+from mechanics.model.model import Model
+from mechanics.model.one_d_laws import LAWS as ONE_D_LAWS
+from mechanics.model.one_d_laws import RIVALS as RIVALS
+from mechanics.model.one_d_laws import Law, forces_of, spread_law
+from mechanics.presses.making import of_paths
+from mechanics.presses.repeats import sites_of
+from mechanics.presses.table import MARGIN_S, Presses
 from mechanics.progress import Progress, silent
-from mechanics.sites import TouchSites, touch_sites, touch_solver
-from mechanics.smooth_field import SmoothField
-from mechanics.touch import forces_at
 from reconstruct.steps.s6_one_d.one_d import columns, fit_robust, low_passed
 from reconstruct.steps.s7_modulus.modulus_field import (
     LAW_ERROR,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 
 LEAST_HELD, LEAST_SEEN = 2, 4  # presses; smaller regions say nothing
 

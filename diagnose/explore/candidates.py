@@ -16,10 +16,10 @@ import numpy as np
 
 from diagnose.explore.goals import GoalState, off_support, surface_error
 from diagnose.explore.separating import Separation
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from mechanics.gaussian import squared_exponential
 from mechanics.options import option
-from mechanics.tetmesh import vertex_normals
+from mechanics.shape.tetmesh import vertex_normals
 from reconstruct.shapes.points import farthest_points
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s4_surface.surface import Surface

@@ -14,13 +14,13 @@ from functools import cached_property
 import numpy as np
 
 from diagnose.explore.goals import off_support, surface_error
-from mechanics.nearest import distance
-from mechanics.presses import Presses
+from mechanics.compliance.sites import LoadPatch, TouchSites, patch_width, touch_sites, touch_solver
+from mechanics.elastic.solver import Solver
+from mechanics.presses.table import Presses
 from mechanics.progress import Clock
-from mechanics.recording import Recording
-from mechanics.sites import LoadPatch, TouchSites, patch_width, touch_sites, touch_solver
-from mechanics.solver import Solver
-from mechanics.tetmesh import TetMesh
+from mechanics.recording.recording import Recording
+from mechanics.shape.nearest import distance
+from mechanics.shape.tetmesh import TetMesh
 from reconstruct.shapes.evidence import LEAST_TOUCHES
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s1_filter.signals import filtered_of
@@ -209,5 +209,6 @@ def solved_sites(
         far=np.concatenate([p.far for p, _ in parts]),
         patch_width_m=float(width),
         poisson_ratio=poisson_ratio,
+        bracing=np.concatenate([p.bracing for p, _ in parts]),
     )
     return sites, np.array([gradient for _, gradient in parts])

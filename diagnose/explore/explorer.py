@@ -20,10 +20,10 @@ from diagnose.explore.state import State, cause_goal
 from diagnose.explore.suggestion import Situation, Suggestion, suggest
 from diagnose.explore.weighing import Weighing
 from mechanics.errors import ContactError, DiagnosisError, LoudAirError, MeshError, ModelError, SurfaceError
-from mechanics.nearest import distance
 from mechanics.progress import Clock
 from mechanics.quantities import USUAL_POISSON_RATIO
-from mechanics.recording import Recording, write_recording
+from mechanics.recording.recording import Recording, write_recording
+from mechanics.shape.nearest import distance
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 

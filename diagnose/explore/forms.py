@@ -8,11 +8,11 @@ import numpy as np
 
 from diagnose.forward.prediction import Forward
 from diagnose.forward.touches import unobservable_effects
+from mechanics.compliance.far_field import energy_fields
 from mechanics.effects.base import Effect, Role
 from mechanics.effects.registry import effects
 from mechanics.effects.settings import Settings
-from mechanics.far_field import energy_fields
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 
 Act = Callable[[Settings, Forward], None]
 """Sets one form of a cause in a prediction."""

@@ -22,7 +22,7 @@ from diagnose.search.descent import fit
 from diagnose.search.fit import settings_of
 from mechanics.effects.registry import effect
 from mechanics.effects.time_delay import EFFECT as DELAY
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 
 MOST = 3

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import RecordingError
-from mechanics.recording import Recording
-from mechanics.segments import STATED
-from mechanics.segments import Segment as Stretch
+from mechanics.recording.recording import Recording
+from mechanics.recording.segments import STATED
+from mechanics.recording.segments import Segment as Stretch
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 
 AIR_S = 0.3
@@ -72,7 +72,7 @@ class Instrument:
 
     def __post_init__(self) -> None:
         """Raises RecordingError for what no recording may state."""
-        from mechanics.recording import SCHEMA
+        from mechanics.recording.files import SCHEMA
 
         for table, name in (("tool", "tip_radius_m"), ("recording", "sample_rate_hz")):
             key, value = SCHEMA[table][name], getattr(self, name)  # type: ignore[index]
@@ -81,10 +81,11 @@ class Instrument:
 
 
 def check_joined(instrument: Instrument, segments: list[Segment], segment: Segment) -> None:
-    """Raises RecordingError where a segment makes what no exploration can be (mechanics.recording)."""
-    from mechanics.recording import check_sane
+    """Raises RecordingError where a segment makes what no exploration can be."""
+    from mechanics.recording.sane import check_sane
 
-    check_sane(join(instrument, [*segments, segment]))
+    joined = join(instrument, [*segments, segment])
+    check_sane(joined.t, joined.sample_rate_hz, joined.position, joined.force_on_tool)
 
 
 def join(instrument: Instrument, segments: list[Segment]) -> Recording:

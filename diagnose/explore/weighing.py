@@ -25,14 +25,14 @@ from diagnose.search.gaps import modulus_share
 from diagnose.search.shape import site_stiffness_sd
 from diagnose.search.starts import first_touches
 from diagnose.search.whiten import Whitener
+from mechanics.compliance.pressed_places import Places
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effects
 from mechanics.effects.settings import Settings
 from mechanics.gaussian import squared_exponential
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.pressed_places import Places
-from mechanics.presses import Presses
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.presses.table import Presses
 from reconstruct.steps.s5_mesh.meshing import uncertainty_at
 
 LEAST_PRESSES = 6
@@ -185,8 +185,9 @@ def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
     sites, _ = solved_sites(e.solved, touches.point, touches.normal, model.material.poisson_ratio)
     far = np.einsum("pij,pjk,plk->pil", touches.frame, sites.far, touches.frame)
     places = Places(
-        model, touches.point, touches.normal, touches.frame, np.ascontiguousarray(far), sites.curvature
-    )
+        model, touches.point, touches.normal, touches.frame, np.ascontiguousarray(far), sites.curvature,
+        sites.bracing,
+    )  # fmt: skip
     forward = Forward(touches, places)
     if e.exploration is not None:
         # bias, drift and the tool's weight are read in free air, not in presses

@@ -3,8 +3,8 @@ it.
 
 Local frame of a place: axis 0 is the outward normal, axes 1 and 2 are tangents. `y` is how far the tip's
 centre has gone INTO the object since first touch (y[0] is the depth), `f` the force on the tool, so that
-pressing gives f[0] > 0. The touch is mechanics.touch, slip that of mechanics.effects.friction_slip, and what
-follows the path mechanics.effects.laws_along_path: what is fitted is what is rendered.
+pressing gives f[0] > 0. The touch is mechanics.contact.touch, slip that of mechanics.effects.friction_slip,
+and what follows the path mechanics.effects.laws_along_path: what is fitted is what is rendered.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from mechanics.dent import dent_load
+from mechanics.contact.dent import dent_load
+from mechanics.contact.touch import STATE_SIZE, touch_remember, touch_solve
 from mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
 from mechanics.effects.laws_along_path import sharp_laws, smooth_laws
-from mechanics.touch import STATE_SIZE, touch_remember, touch_solve
 
 SUB_PLACES = 5
 """Of a thinned step's path, over which a sharp law is averaged."""
@@ -26,9 +26,9 @@ def integrate(start, y, far, radius, bend, e_dent, e_far, nu, table, tool_compli
     """Force on the tool along every press.
 
     start: (p + 1,) first sample of each press. y: (n, 3) m. far: (p, 3, 3) unit modulus, 1/m.
-    radius: (p,) m, of tip and surface together. bend: (p,) mechanics.dent.bend_of. e_dent, e_far: (p,) Pa,
-    modulus under the tip and of the whole. table: of a dent law. tool_compliance: 1 / k of a spring in
-    series, m/N. mu: friction; inf: the tip sticks. Writes out: (n, 3) N.
+    radius: (p,) m, of tip and surface together. bend: (p,) mechanics.contact.dent.bend_of. e_dent, e_far:
+    (p,) Pa, modulus under the tip and of the whole. table: of a dent law. tool_compliance: 1 / k of a spring
+    in series, m/N. mu: friction; inf: the tip sticks. Writes out: (n, 3) N.
     """
     state = np.zeros(STATE_SIZE)
     compliance = np.empty((3, 3))

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.forward.prediction import Forward
-from mechanics.presses import Presses
-from mechanics.side_of_play import leads
+from mechanics.presses.table import Presses
+from mechanics.recording.side_of_play import sides
 
 DEEPEST_M = 0.009
 CLEARANCE_M = 2e-3
@@ -41,7 +41,8 @@ def pressed(forward: Forward, plan: Plan) -> Presses:
     contact = np.flatnonzero(into > 0)
     centre = t.point + forward.tip_radius * t.normal
     position = (centre[:, None] - np.einsum("pij,ni->pnj", t.frame, local)).reshape(-1, 3)
-    lead = np.concatenate([leads(clock, position[i * n : (i + 1) * n]) for i in range(p)])
+    told = [sides(clock, position[i * n : (i + 1) * n]) for i in range(p)]
+    lead, unsure = (np.concatenate(each) for each in zip(*told, strict=True))
     turned = None if t.quaternion is None else np.repeat(t.quaternion[t.starts[:-1]], n, axis=0)
     none = np.zeros_like(position)
     return dataclasses.replace(
@@ -52,7 +53,7 @@ def pressed(forward: Forward, plan: Plan) -> Presses:
         force=none,
         free_air=none,
         quaternion=turned,
-        columns={"lead": lead},
+        columns={"lead": lead, "unsure": unsure},
         site=np.arange(p),
         onset_s=np.full(p, clock[contact[0]]),
         peak_s=np.full(p, clock[int(np.argmax(into))]),

@@ -15,13 +15,13 @@ import numpy as np
 
 from diagnose.forward import kernel
 from diagnose.forward.touches import place_of
-from mechanics.dent import bend_of, effective_radius
+from mechanics.compliance.pressed_places import Places, solve_places
+from mechanics.contact.dent import bend_of, effective_radius
 from mechanics.effects.laws_along_path import new_memory, path_numbers
 from mechanics.effects.settings import Settings
-from mechanics.kinematics import acceleration
-from mechanics.model import Model
-from mechanics.pressed_places import Places, solve_places
-from mechanics.presses import Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
+from mechanics.recording.kinematics import acceleration
 
 KEPT = 8
 """Integrated touches that are kept."""
@@ -76,8 +76,14 @@ class Forward:
 
     @property
     def lead(self) -> np.ndarray:
-        """(n, 3) side of the tip in a play that the reading follows (mechanics.side_of_play)."""
+        """(n, 3) side of the tip in a play that the reading follows (mechanics.recording.side_of_play)."""
         return self.touches.columns["lead"]
+
+    @property
+    def unsure(self) -> np.ndarray:
+        """(n, 3) standard deviation of that side."""
+        known = self.touches.columns.get("unsure")
+        return np.zeros_like(self.lead) if known is None else known
 
     @property
     def quaternion(self) -> np.ndarray | None:
@@ -124,7 +130,7 @@ class Forward:
         f = self._kept.get(key)
         if f is None:
             curvature = np.broadcast_to(np.asarray(self.places.curvature, dtype=float), (len(t),))
-            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature)
+            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature, self.places.bracing)
             f = np.zeros_like(y)
             modulus = usual * s.stiffness
             far, mu = np.ascontiguousarray(s.far), float(s.touch.friction)

@@ -10,8 +10,8 @@ import numpy as np
 from mechanics.effects.base import Role, Scope
 from mechanics.effects.registry import effects
 from mechanics.errors import DiagnosisError
-from mechanics.presses import LEAD_S, STEP_S, Presses
-from mechanics.side_of_play import leads
+from mechanics.presses.table import LEAD_S, STEP_S, Presses
+from mechanics.recording.side_of_play import sides
 
 REACH_M = 2.4e-3
 """Most by which a first touch is moved."""
@@ -31,7 +31,8 @@ def reached(presses: Presses) -> np.ndarray:
 
 
 def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
-    """The thinned view of a table; its columns hold `lead`, the side of the tip in a play (`side_of_play`).
+    """The thinned view of a table; its columns hold `lead` and `unsure`, the side of the tip in a play and
+    its standard deviation (`side_of_play`).
 
     Presses of fewer places than 4 are a group each: they are held out press by press, and show nothing from
     place to place (`unobservable_effects`). Raises DiagnosisError with fewer than 6 presses: nothing can be
@@ -46,9 +47,10 @@ def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
         raise DiagnosisError("the table of presses has no samples: reconstruct the recording again")
     if presses.quasi_static:
         return _enough(presses, np.diff(presses.starts) >= LEAST_POINTS, f"have {LEAST_POINTS} rows or more")
-    lead = np.concatenate([leads(presses.t[part], presses.position[part]) for part in presses.parts])
+    told = [sides(presses.t[part], presses.position[part]) for part in presses.parts]
+    lead, unsure = (np.concatenate(each) for each in zip(*told, strict=True))
     limit = np.append(presses.onset_s[1:] - LEAD_S, np.inf)
-    seen = dataclasses.replace(presses, columns={"lead": lead})
+    seen = dataclasses.replace(presses, columns={"lead": lead, "unsure": unsure})
     rows = (seen.t >= (seen.onset_s - LEAD_S)[seen.press]) & (
         seen.t < np.minimum(seen.end_s + LEAD_S, limit)[seen.press]
     )

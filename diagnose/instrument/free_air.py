@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from diagnose.instrument.jackknife import all_but_one, covariance
-from mechanics.kinematics import acceleration
-from mechanics.presses import Presses
-from mechanics.recording import Recording
-from mechanics.samples import runs
+from mechanics.presses.table import Presses
+from mechanics.recording.kinematics import acceleration
+from mechanics.recording.recording import Recording
+from mechanics.recording.samples import runs
 
 BLOCK_S = 0.25
 MIN_BLOCKS = 8

@@ -1,5 +1,5 @@
 """What is found before any press is looked at: bias, drift and the tool's own weight in free air, a yielding
-tool on the rigid support, a move of the object between two tracings of its base.
+tool or a play on the rigid support, a move of the object between two tracings of its base.
 
 It is taken off the forces and positions, so that the search for other effects starts from clean ones.
 """
@@ -16,11 +16,17 @@ from diagnose.instrument.free_air_offsets import InstrumentOffsets, around, free
 from diagnose.instrument.retraced import Move
 from diagnose.instrument.rigid import Rigid
 from diagnose.options import AttributionOptions
+from mechanics.effects.backlash import EFFECT as PLAY
+from mechanics.effects.base import Effect
 from mechanics.effects.force_gain import EFFECT as GAIN
 from mechanics.effects.surface_offset import EFFECT as OFFSET
 from mechanics.effects.tool_compliance import EFFECT as SPRING
 
 RULES = AttributionOptions()
+LEAST_PLAY_M = 5e-5
+"""A narrower play on the support may be what rounding makes of it."""
+PLAY_GIVES = 0.05
+"""Share by which a play's width may be another than the support shows."""
 
 
 def find_instrument_offsets(
@@ -50,13 +56,19 @@ def find_instrument_offsets(
 def ruled_out(
     forward: Forward, rigid: Rigid | None, move: Move | None, rules: AttributionOptions = RULES
 ) -> frozenset[str]:
-    """What the support shows not to be there: a spring or a move that is too small to matter even if it is
-    `rules.z` standard errors greater than it was read."""
+    """What the support shows not to be there: a spring, a play or a move that is too small to matter even if
+    it is `rules.z` standard errors greater than it was read."""
     gone = set()
     if rigid is not None and np.isfinite(rigid.error):
         most = max(rigid.compliance, 0.0) + rules.z * rigid.error
         if not matters(forward, _yielding(forward, most), rules):
             gone.add(SPRING.name)
+    if rigid is not None and np.isfinite(rigid.play_error):
+        most = abs(rigid.play) + rules.z * rigid.play_error
+        if not _shows_play(rigid, rules) and not any(
+            matters(forward, _played(forward, width), rules) for width in (-most, most)
+        ):
+            gone.add(PLAY.name)
     if move is not None:
         t = forward.touches
         along, error = move.along(t.point, t.normal)
@@ -72,6 +84,14 @@ def _yielding(forward: Forward, compliance: float) -> np.ndarray:
     read = np.nan_to_num(forward.predict(settings))
     corrected = dataclasses.replace(t, position=t.position + compliance * t.force)
     return np.nan_to_num(dataclasses.replace(forward, touches=corrected).predict(settings)) - read
+
+
+def _played(forward: Forward, width: float) -> np.ndarray:
+    """(n, 3) N: what the ideal model says more with a play of `width` m (mechanics.effects.backlash)."""
+    settings = forward.ideal(forward.model.material.young_modulus_pa)
+    here = np.nan_to_num(forward.predict(settings))
+    PLAY.act(settings, np.array([np.clip(width, *(bound[0] for bound in PLAY.bounds))]), forward)
+    return np.nan_to_num(forward.predict(settings)) - here
 
 
 def _moved(forward: Forward, along: np.ndarray) -> np.ndarray:
@@ -111,6 +131,22 @@ def with_move(
     parameters = {"shift_m": move.shift.tolist(), "rotation_rad": move.turn.tolist()}
     intervals = {"shift_m": around(move.shift, sd[:3]), "rotation_rad": around(move.turn, sd[3:])}
     return offsets.also(OFFSET.name, parameters, intervals, change, why)
+
+
+def _shows_play(rigid: Rigid, rules: AttributionOptions) -> bool:
+    return abs(rigid.play) > max(rules.z * rigid.play_error, LEAST_PLAY_M)
+
+
+def seen_play(rigid: Rigid | None, excluded: set[str], rules: AttributionOptions = RULES) -> Effect | None:
+    """A play that the support shows, its width held to what was read there: a free one would widen until it
+    took a solid's memory in; else None."""
+    if rigid is None or PLAY.name in excluded or not _shows_play(rigid, rules):
+        return None
+    give = float(np.hypot(PLAY_GIVES * rigid.play, rules.z * rigid.play_error))
+    known = dataclasses.replace(
+        PLAY.parameters[0], low=rigid.play - give, high=rigid.play + give, starts=(rigid.play,)
+    )
+    return dataclasses.replace(PLAY, parameters=(known,))
 
 
 def read_sideways(rigid: Rigid | None, rules: AttributionOptions = RULES) -> frozenset[str]:

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from diagnose.instrument.jackknife import all_but_one, covariance
 from diagnose.instrument.rigid import KINDS, on_support
 from mechanics.frames import tangents
-from mechanics.presses import Presses
-from mechanics.recording import Recording
+from mechanics.presses.table import Presses
+from mechanics.recording.recording import Recording
 
 GROUPS = 10
 """Stretches of either tracing that are left out in turn for standard errors."""

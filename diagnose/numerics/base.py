@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.effects.base import Effect
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 
 DOMAIN = "numerics"
 LEAST_SHARE = 0.1
@@ -56,6 +56,7 @@ class NumericalEffect(Effect):
 
 
 def signal_of(presses: Presses, force: np.ndarray) -> Signal:
-    """The signal of a table of presses (mechanics.presses) with a simulated force (n, 3) N at its rows."""
+    """The signal of a table of presses (mechanics.presses.table) with a simulated force (n, 3) N at its
+    rows."""
     normal, none = presses.normal[presses.press], np.zeros(len(force), bool)
     return Signal(presses.t, force, presses.travel[:, 0], normal, tuple(presses.parts), none)

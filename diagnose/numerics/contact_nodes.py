@@ -8,19 +8,19 @@ by nodes alone is met late, between them, by a share of a0^2 / R.
 import numpy as np
 
 from diagnose.numerics.base import DOMAIN, NumericalEffect
-from mechanics.dent import grid
+from mechanics.contact.dent import grid
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.schema import Key
 
 _JOIN = 3.0
 """How sharply punch and sphere meet."""
 
 
 def punch_factors(radius_ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    """Factors on a dent's normal force and stick at mechanics.dent.grid(): a patch of at least that radius,
-    over the tip's."""
+    """Factors on a dent's normal force and stick at mechanics.contact.dent.grid(): a patch of at least that
+    radius, over the tip's."""
     x = grid()
     wider = radius_ratio / np.sqrt(np.maximum(x, 0.5 * x[1]))
     return (1 + (1.5 * wider) ** _JOIN) ** (1 / _JOIN), (1 + wider**_JOIN) ** (1 / _JOIN)

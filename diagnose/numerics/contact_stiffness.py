@@ -12,19 +12,19 @@ import numpy as np
 
 from diagnose.forward.prediction import Forward
 from diagnose.numerics.base import DOMAIN, NumericalEffect
-from mechanics.dent import grid
+from mechanics.contact.dent import grid
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.schema import Key
 
 _TYPICAL = 0.2
 """Of the tip's radius: the dent at which the layer's stiffness is told as one spring's."""
 
 
 def layer_factors(share: float) -> tuple[np.ndarray, np.ndarray]:
-    """Factors on a dent's normal force and stick at mechanics.dent.grid(), where a layer of that B lies on
-    the object."""
+    """Factors on a dent's normal force and stick at `mechanics.contact.dent.grid()`, where a layer of that B
+    lies on the object."""
     x = np.maximum(grid(), 0.5 * grid()[1])
     left = (0.5 * (np.sqrt(share**2 + 4 * x) - share)) ** 2 / x
     return left**1.5, np.sqrt(left)

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.ndimage import grey_closing
 
 from diagnose.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, Seen, Signal
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Role, Scope, no_keys
-from mechanics.schema import Key
 
 LONGEST_S = 0.05
 """Of a gap that counts as flicker; longer ones are contact that was lost for good (`tunnelling`)."""

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.schema import Key
 
 
 def _stiffer(scene: Scene) -> np.ndarray:

@@ -4,9 +4,9 @@ import numpy as np
 
 from diagnose.forward.prediction import Forward
 from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.settings import WEIGHED, Scene, Settings
-from mechanics.schema import Key
 
 
 def _velocity(scene: Forward) -> np.ndarray:

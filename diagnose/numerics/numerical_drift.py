@@ -3,9 +3,9 @@
 import numpy as np
 
 from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
-from mechanics.schema import Key
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

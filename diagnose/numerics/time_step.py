@@ -3,10 +3,10 @@
 import numpy as np
 
 from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.settings import LATE, Scene, Settings
-from mechanics.samples import delayed
-from mechanics.schema import Key
+from mechanics.recording.samples import delayed
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.search.evidence import Search
+from diagnose.search.fewer import fewer
 from diagnose.search.leave_one_out import Candidate
 from diagnose.search.naming import Score
 from diagnose.search.rivals import confidence_set_p, of_one_phenomenon, rivals_of
@@ -108,16 +109,19 @@ def attribute(
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
     picked = list(zip(steps, chosen, strict=False))
+    taken = tuple(name for _, name in picked)
     current, chosen = _without_idle(search, chosen, current, seen)
+    if any(n not in seen for n in chosen):
+        current, chosen = fewer(search, chosen, current, steps[0], seen)
+        picked += [(steps[0], n) for n in chosen if n not in taken]
     for effect in current.found.effects:
         current = _refined(search, effect, current)
-    sets = [confidence_set_p(scores) for scores in steps]
     asked = [n for n in chosen if n not in seen]
-    rivals = tuple(n for n in rivals_of(search, picked, sets, asked) if n not in seen)
+    rivals = tuple(n for n in rivals_of(search, picked, asked) if n not in seen)
     order = _strongest_first(search, current, chosen)
     return Attribution(
         base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps),
-        tuple(name for _, name in picked), float(strain_gain), sets[0],
+        taken, float(strain_gain), confidence_set_p(steps[0]),
     )  # fmt: skip
 
 

@@ -55,16 +55,15 @@ def confidence_p(losses: np.ndarray, rng: np.random.Generator, draws: int = 1000
 def rivals_of(
     search: Search,
     picked: list[tuple[dict[str, Score], str]],
-    sets: list[dict[str, float]],
     chosen: list[str],
 ) -> tuple[str, ...]:
     """Effects that would be named themselves and that the sites do not tell from the one picked in the same
     step; the likeliest first."""
     found: dict[str, float] = {}
-    for (scores, name), p in zip(picked, sets, strict=False):
+    for scores, name in picked:
         if name not in chosen:
             continue
-        first = scores[name]
+        first, p = scores[name], confidence_set_p(scores)
         for score in scores.values():
             if score.name in chosen or of_one_phenomenon(score.effect, first.added):
                 continue

@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 
 from diagnose.options import NuisanceOptions
 from diagnose.search.fit import Fit
-from mechanics.model import Model
-from mechanics.presses import Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
 
 SHARE_PER_HEIGHT = 2.5
 """Relative stiffness error a unit of surface error over the object's height (edges near a press count

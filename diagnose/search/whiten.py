@@ -22,7 +22,7 @@ from diagnose.forward.prediction import Forward
 from diagnose.forward.touches import FOLLOWED
 from diagnose.options import NuisanceOptions
 from mechanics.effects.settings import Settings
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 
 _FEW_COLUMNS = 3
 _MODES = 2
@@ -68,6 +68,9 @@ class Whitener:
         columns = nuisance_columns(forward, settings, before, options, site_sd, self.onset_sd)
         columns += [("press", bridge) for bridge in bridges]
         self.onset_column = columns[0][1] / self.onset_sd[self.touches.press][:, None]
+        if settings.unsure_m is not None:
+            slope = np.linalg.norm(self.onset_column, axis=1)
+            self.louder = np.sqrt(self.louder**2 + (slope * settings.unsure_m) ** 2 / self.variance)
         site = options.site_stiffness if site_sd is None else site_sd
         self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(presses)
         brought = 0.0
@@ -127,6 +130,13 @@ class Whitener:
     @cached_property
     def _halved(self) -> sp.csr_matrix:
         return sp.block_diag([b.halved for b in self.blocks], format="csr")
+
+    @cached_property
+    def volume(self) -> np.ndarray:
+        """(g,) half the logarithm of the determinant of each group's covariance, N^2."""
+        loud = np.log(self.louder * np.sqrt(self.variance))
+        each = [3 * loud[b.rows].sum() + np.log(np.diag(b.factor[0])).sum() for b in self.blocks]
+        return np.array(each)
 
     def counts(self) -> np.ndarray:
         """(g,) thinned contact samples of each group."""

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from diagnose.specimen.bench import HAND_TIP_M, Bench
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from reconstruct.steps.s1_filter.low_pass import white_noise_std
 
 APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from mechanics.errors import ContactError
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.press_cutting import FoundAround, FoundPresses, cut
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.presses.cutting import FoundAround, FoundPresses, cut
 from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M, parse_unit, unit_of_key
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from mechanics.robust import spread_about_zero
 from reconstruct.geometry.slab import flat_mesh, half_space_size
 from reconstruct.steps.s1_filter.low_pass import white_noise_std

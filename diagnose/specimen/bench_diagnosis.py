@@ -15,7 +15,7 @@ from diagnose.search.fit import settings_of
 from diagnose.search.whiten import Whitener
 from diagnose.specimen.bench import PEAK_N, Bench
 from diagnose.verdict.result import Diagnosis
-from mechanics.presses import HOLDING
+from mechanics.presses.table import HOLDING
 from mechanics.progress import Progress, silent
 
 _FLOOR = {False: 0.005, True: 0.02}

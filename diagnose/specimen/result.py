@@ -11,7 +11,7 @@ import numpy as np
 from diagnose.specimen.bench import Curve
 from diagnose.verdict.result import Diagnosis
 from mechanics.result import Result
-from reconstruct.external.uniaxial import Uniaxial
+from reconstruct.machine_curves.uniaxial import Uniaxial
 from reconstruct.steps.s7_modulus.held_out import BETTER
 
 FLOORS = {

@@ -9,7 +9,7 @@ from diagnose.specimen.approach import Approach
 from diagnose.specimen.bench import HAND_TIP_M, Bench
 from diagnose.specimen.yielding import Machine
 from diagnose.verdict.result import Diagnosis
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 
 Seen = tuple[np.ndarray, np.ndarray, np.ndarray, str, str]
 """Depth m, force N measured, force N of the fit, and the axes' words."""

@@ -15,7 +15,7 @@ import numpy as np
 
 from diagnose.specimen.bench import Bench, Curve
 from diagnose.specimen.yielding import Way, left_out_error
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from reconstruct.steps.s1_filter.low_pass import white_noise_std
 
 _PUSHES, _OFF = 0.03, 0.01

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.disk.schema import Key
 from mechanics.effects.registry import effect
-from mechanics.schema import Key
 
 SURENESS_FILE = Path(__file__).with_name("sureness.toml")
 WIDENING_FILE = Path(__file__).with_name("widening.toml")

@@ -18,7 +18,7 @@ from diagnose.search.gaps import gap, resampled
 from diagnose.search.leave_one_out import Candidate
 from diagnose.search.whiten import Whitener
 from diagnose.verdict.answer import Answer, Findings
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 
 FOLDS = 6
 ITERATIONS = 6

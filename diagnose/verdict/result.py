@@ -13,8 +13,8 @@ from diagnose.forward.prediction import Forward
 from diagnose.instrument.free_air import FreeAir
 from diagnose.search.attribution import Attribution
 from diagnose.verdict.where import Where
-from mechanics.model import Model
-from mechanics.recording import Recording
+from mechanics.model.model import Model
+from mechanics.recording.recording import Recording
 from mechanics.result import Result
 
 _SENTENCES = {

@@ -10,8 +10,8 @@ from scipy.stats import chi2
 
 from diagnose.forward.prediction import Forward
 from diagnose.instrument.free_air import FreeAir
-from mechanics.gap_bins import gap_by_bin
-from mechanics.presses import HOLDING, LOADING, UNLOADING, Presses
+from mechanics.presses.gap_bins import gap_by_bin
+from mechanics.presses.table import HOLDING, LOADING, UNLOADING, Presses
 
 AXES = ("depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air")
 FLIPS = 2000
@@ -30,7 +30,7 @@ class Axis:
 class Where:
     """axes: in the contract's order. worst: (x, y, z, rmse_n) of the sites, worst first. site_rmse: (s,) N.
 
-    bins: N rms of the gap that the verdict states (mechanics.gap_bins); beside `press_n` each press's
+    bins: N rms of the gap that the verdict states (mechanics.presses.gap_bins); beside `press_n` each press's
     `press_s`, s of its first touch, and `site`.
     curves: name -> (x, mean over sites, its error) of the normal residual along depth, rate and time, for
     pictures.

@@ -7,23 +7,27 @@ not taken off a recording: the tip's side of the play is not known in free air.
 
 import numpy as np
 
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Effect, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.schema import Key
-from mechanics.side_of_play import play
+from mechanics.recording.side_of_play import play
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     width, frame = values[0], scene.places.frame[scene.press]
+    if width <= 0:
+        # the hand moves the tip and the reading follows once the play is taken up
+        ahead = 0.5 * width * np.einsum("nij,nj->ni", frame, scene.lead)
+        settings.move(lambda y: y + ahead)
+        settings.unsure_m = 0.5 * abs(width) * np.sqrt((scene.unsure**2).mean(axis=1))
+        return
 
     def move(y: np.ndarray) -> np.ndarray:
-        if width <= 0:
-            # the hand moves the tip and the reading follows once the play is taken up
-            return y + 0.5 * width * np.einsum("nij,nj->ni", frame, scene.lead)
         device = np.ascontiguousarray(np.einsum("nij,ni->nj", frame, y))
         played = np.empty_like(device)
-        play(scene.start, device, width, played)
+        # a way into the object is one against the frame's axes
+        play(scene.start, device, -scene.lead[scene.start[:-1]], width, played)
         return np.einsum("nij,nj->ni", frame, played)
 
     settings.move(move)

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.disk.schema import ANY, Schema
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
-from mechanics.model import Model
-from mechanics.recording import Recording
-from mechanics.schema import ANY, Schema
+from mechanics.model.model import Model
+from mechanics.recording.recording import Recording
 
 DOMAINS = ("object", "contact", "boundary", "instrument")
 Keys = Mapping[str, Any]
@@ -82,7 +82,7 @@ class Effect:
     law: what it does along the path of a touch; `touch` sets its numbers.
     apply(model, keys): the model with the effect; None: it is not rendered. `unchanged` where the law reads
     the keys.
-    hold(keys, young_modulus_pa): how the base is held, as fields of mechanics.support.BaseHold.
+    hold(keys, young_modulus_pa): how the base is held, as fields of mechanics.elastic.support.BaseHold.
     correct(recording, keys): the recording without it; None: it cannot be taken off.
     read_as: place among the corrections of a reading; what the instrument does last is taken off first.
     hints: what only the search of a diagnosis needs.

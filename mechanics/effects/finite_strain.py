@@ -5,7 +5,7 @@ import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Role, Scope, no_keys
 from mechanics.effects.settings import Scene, Settings, Touch
-from mechanics.model import Model
+from mechanics.model.model import Model
 
 LAW = "neo-hookean"
 

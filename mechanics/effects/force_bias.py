@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mechanics.calibration import Calibration
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
 from mechanics.effects.settings import SHIFTED, Scene, Settings
-from mechanics.recording import Recording
-from mechanics.schema import Key
+from mechanics.recording.calibration import Calibration
+from mechanics.recording.recording import Recording
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

@@ -6,12 +6,12 @@ it, a secant step on what is too much; renderer and prediction take the same wal
 
 from __future__ import annotations
 
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Touch
 from mechanics.kernels import kernel
-from mechanics.model import Model
-from mechanics.schema import Key
+from mechanics.model.model import Model
 
 SLIPS = 12
 CAUTION, SECANT_CAUTION = 0.9, 0.98

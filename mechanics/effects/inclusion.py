@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mechanics.compliance.far_field import energy_fields
+from mechanics.compliance.patch import PatchSampler
+from mechanics.compliance.pressed_places import Places
+from mechanics.compliance.sites import PATCH_WIDTH_IN_EDGES
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import Misfit, SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.far_field import energy_fields
-from mechanics.material import BALL, Ball
-from mechanics.model import Model
-from mechanics.moduli import inclusion_ratio
-from mechanics.patch import PatchSampler
-from mechanics.pressed_places import Places
-from mechanics.refine import typical_edge
-from mechanics.sites import PATCH_WIDTH_IN_EDGES
-from mechanics.solver import Solver
+from mechanics.elastic.solver import Solver
+from mechanics.model.material import BALL, Ball
+from mechanics.model.model import Model
+from mechanics.model.moduli import inclusion_ratio
+from mechanics.shape.refine import typical_edge
 
 RATIO_LIMITS = (0.15, 20.0)
 GRID_M = 0.007

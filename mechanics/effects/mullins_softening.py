@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-from mechanics.dent import dent_load
+from mechanics.contact.dent import dent_load
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Touch
 from mechanics.kernels import kernel
-from mechanics.model import Model
-from mechanics.schema import Key
+from mechanics.model.model import Model
 
 _NONE = 1e-6  # 1 / r that counts as none
 

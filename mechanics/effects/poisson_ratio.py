@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 
+from mechanics.compliance.far_field import far_at_poisson
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.far_field import far_at_poisson
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.quantities import POISSON_RATIO
 
 

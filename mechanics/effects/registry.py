@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import importlib
 
+from mechanics.disk.schema import Schema
 from mechanics.effects.base import Effect
 from mechanics.errors import OptionError
 from mechanics.names import unknown
-from mechanics.schema import Schema
 
 NAMES = (
     "finite_strain",

@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from mechanics.dent import DentLaw, dent_law
+from mechanics.compliance.pressed_places import Places
+from mechanics.contact.dent import DentLaw, dent_law
 from mechanics.effects.law import Law
-from mechanics.pressed_places import Places
 
 STICKS = float("inf")
 
@@ -20,8 +20,8 @@ class Touch:
     """What one tip feels where it touches; prediction and renderer read it.
 
     dent_law: name of the dent's law; factors: functions of Poisson's ratio that give the factors on its
-    normal force and sideways stiffness, (k,) each, at mechanics.dent.grid(). tip_ratio: radius of the tip
-    over the stated one. friction: Coulomb's coefficient. numbers: (k,) of each law along the path.
+    normal force and sideways stiffness, (k,) each, at mechanics.contact.dent.grid(). tip_ratio: radius of the
+    tip over the stated one. friction: Coulomb's coefficient. numbers: (k,) of each law along the path.
     """
 
     dent_law: str = "linear"
@@ -44,8 +44,9 @@ class Settings:
 
     modulus: Pa. nu: Poisson's ratio. far: (p, 3, 3) local, unit modulus. dent_ratio: (p,) modulus under the
     tip over the global one. onset: (p,) m, how much earlier each press meets the surface. stiffness: (p,)
-    factor. tool_compliance: m/N, of a spring in series at the stated modulus. moves: where the tip is, (n, 3)
-    m, from where it reads. readings: what is read, (n, 3) N in the device frame, from what is felt; in the
+    factor. tool_compliance: m/N, of a spring in series at the stated modulus. unsure_m: (n,) standard
+    deviation of where the tip is, along any axis, or None. moves: where the tip is, (n, 3) m, from where it
+    reads. readings: what is read, (n, 3) N in the device frame, from what is felt; in the
     order of their numbers.
     """
 
@@ -57,6 +58,7 @@ class Settings:
     stiffness: np.ndarray
     touch: Touch = field(default_factory=Touch)
     tool_compliance: float = 0.0
+    unsure_m: np.ndarray | None = None
     moves: list[Callable[[np.ndarray], np.ndarray]] = field(default_factory=list)
     readings: list[tuple[int, Callable[[np.ndarray], np.ndarray]]] = field(default_factory=list)
 
@@ -77,7 +79,8 @@ class Scene(Protocol):
     """What effects see of a recording's presses: p presses, n samples.
 
     places: the pressed places. start: (p + 1,) rows of each press. t: (n,) s, the recording's clock. press:
-    (n,). lead: (n, 3) side of the tip in a play that the reading follows. quaternion: (n, 4) tool to device,
+    (n,). lead, unsure: (n, 3) side of the tip in a play that the reading follows, and its standard deviation.
+    quaternion: (n, 4) tool to device,
     or None. acceleration: (n, 3) m/s^2, device frame. tip_radius: m, of the recording, as stated.
     """
 
@@ -91,6 +94,8 @@ class Scene(Protocol):
     def press(self) -> np.ndarray: ...
     @property
     def lead(self) -> np.ndarray: ...
+    @property
+    def unsure(self) -> np.ndarray: ...
     @property
     def quaternion(self) -> np.ndarray | None: ...
     @property

@@ -2,7 +2,7 @@
 
 The modulus under a contact of radius a is E ratio^w(thickness / a), w Gao's weight of a film (Gao, Chiu & Lee
 1992), 0 for a thin and 1 for a thick one: stiff at first touch, less so deeper. How the skin holds the whole
-object together is in the far field, by mechanics.moduli.skin_ratio.
+object together is in the far field, by mechanics.model.moduli.skin_ratio.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.dent import grid
+from mechanics.compliance.far_field import energy_fields, far_with_weights
+from mechanics.contact.dent import grid
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings, Touch
-from mechanics.far_field import energy_fields, far_with_weights
-from mechanics.material import SKIN, Skin
-from mechanics.model import Model
+from mechanics.model.material import SKIN, Skin
+from mechanics.model.model import Model
 
 
 def film_weight(thickness_over_contact: np.ndarray, poisson_ratio: float) -> np.ndarray:

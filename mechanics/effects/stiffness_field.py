@@ -1,9 +1,9 @@
 """Stiffness field: Young's modulus differs smoothly from place to place, as tissue does.
 
-ln E is a Gaussian process of few parameters (mechanics.smooth_field). How much it varies, and over what
-length, is what makes the presses' own stiffness likeliest; what a fit moves are the MODES patterns of which
-these presses tell most, each of unit variance before anything is known. The far field answers to first order,
-the dent through the modulus under the tip; the renderer has the field in its elements.
+ln E is a Gaussian process of few parameters (mechanics.compliance.smooth_field). How much it varies, and over
+what length, is what makes the presses' own stiffness likeliest; what a fit moves are the MODES patterns of
+which these presses tell most, each of unit variance before anything is known. The far field answers to first
+order, the dent through the modulus under the tip; the renderer has the field in its elements.
 """
 
 from __future__ import annotations
@@ -13,16 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.effects.base import Effect, Keys, Parameter, Scope
-from mechanics.effects.hints import Misfit, SearchHints
-from mechanics.effects.settings import Scene, Settings
-from mechanics.far_field import energy_fields
-from mechanics.field_response import far_of, shares_in_elements, tips_of
-from mechanics.material import LENGTH
-from mechanics.model import Model
-from mechanics.pressed_places import Places
-from mechanics.schema import ANY, Key
-from mechanics.smooth_field import (
+from mechanics.compliance.far_field import energy_fields
+from mechanics.compliance.field_response import far_of, shares_in_elements, tips_of
+from mechanics.compliance.pressed_places import Places
+from mechanics.compliance.smooth_field import (
     Prior,
     SmoothField,
     correlation,
@@ -32,6 +26,12 @@ from mechanics.smooth_field import (
     places_of,
     views_of,
 )
+from mechanics.disk.schema import ANY, Key
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import Misfit, SearchHints
+from mechanics.effects.settings import Scene, Settings
+from mechanics.model.material import LENGTH
+from mechanics.model.model import Model
 
 MODES = 10
 _USUAL = Prior(0.35, 0.02, 0.03)

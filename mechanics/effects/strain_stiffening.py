@@ -6,8 +6,8 @@ isotropic part of Fung and of Veronda & Westmann), and 1 / sqrt(1 - 4 r J) below
 c20 / c10 at small strains, and 0 is neo-Hookean.
 
 The dent's force and sideways stiffness over the neo-Hookean ones were solved for some r by the axisymmetric
-finite-strain solver and stand in mechanics/dent_stiffening.csv ('python -m tools.dent_table --family').
-The far field is left as it is.
+finite-strain solver and stand in mechanics/contact/dent_stiffening.csv ('python -m tools.dent_table
+--family'). The far field is left as it is.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from mechanics.dent import grid
+from mechanics.contact.dent import grid
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Touch
-from mechanics.model import Model
-from mechanics.schema import Key
+from mechanics.model.model import Model
 
-FAMILY = Path(__file__).parents[1] / "dent_stiffening.csv"
+FAMILY = Path(__file__).parents[1] / "contact" / "dent_stiffening.csv"
 """Columns ratio, depth / R, ln of the factor on the force over ratio, the same of the sideways stiffness."""
 LEAST, GREATEST = -0.5, 4.0
 """Of the ratio: what the table spans."""
@@ -43,7 +43,7 @@ def hardening(excess: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]
 
 @cache
 def _family() -> PchipInterpolator:
-    """asinh(ratio / _SPREAD) to (2, k): ln of the factors over ratio, at mechanics.dent.grid()."""
+    """asinh(ratio / _SPREAD) to (2, k): ln of the factors over ratio, at mechanics.contact.dent.grid()."""
     ratio, x, force, sideways = np.loadtxt(FAMILY, delimiter=",", unpack=True)
     ratios = np.unique(ratio)
     logs = []
@@ -58,7 +58,7 @@ def _family() -> PchipInterpolator:
 
 
 def stiffening(c20_over_c10: float) -> tuple[np.ndarray, np.ndarray]:
-    """Factors (k,) on the dent's normal force and sideways stiffness at mechanics.dent.grid().
+    """Factors (k,) on the dent's normal force and sideways stiffness at mechanics.contact.dent.grid().
 
     Beyond LEAST or GREATEST the logarithm goes on in proportion to the ratio.
     """

@@ -6,8 +6,8 @@ by more than their shape's uncertainty and nothing else explains how. What the s
 say, so it is not rendered.
 """
 
+from mechanics.disk.schema import ANY, Key
 from mechanics.effects.base import Effect, Role, Scope, no_keys
-from mechanics.schema import ANY, Key
 
 EFFECT = Effect(
     name="surface_shape",

@@ -3,13 +3,13 @@ place."""
 
 import numpy as np
 
-from mechanics.calibration import Calibration
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import LATE, Scene, Settings
-from mechanics.recording import Recording
-from mechanics.samples import delayed
-from mechanics.schema import Key
+from mechanics.recording.calibration import Calibration
+from mechanics.recording.recording import Recording
+from mechanics.recording.samples import delayed
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.disk.schema import Key
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
 from mechanics.kernels import kernel
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.quantities import quantity_words
-from mechanics.schema import Key
 
 
 @kernel

@@ -7,7 +7,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from mechanics import pardiso
+from mechanics.elastic import pardiso
 
 
 class Assembly:

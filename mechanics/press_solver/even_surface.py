@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.true_shape import TrueShape
+from mechanics.shape.true_shape import TrueShape
 
 LONGEST_M = 0.003
 """Longest edge."""
@@ -22,7 +22,7 @@ def even_surface(
     """Vertices (n, 3) m and triangles (k, 3) on the shape whose file is (v, 3) m and (m, 3), closed, outward.
 
     Triangles are halved until no edge of theirs in the file's plane exceeds longest_m. What is new lies on
-    the curved shape (mechanics.true_shape), and the two sides of a crease share no vertices.
+    the curved shape (mechanics.shape.true_shape), and the two sides of a crease share no vertices.
     """
     shape = TrueShape(vertices, triangles)
     corner = shape.vertices[shape.triangles]

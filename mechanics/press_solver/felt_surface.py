@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mechanics.kernels import kernel
-from mechanics.tetmesh import vertex_normals
+from mechanics.shape.tetmesh import vertex_normals
 
 _SMOOTH_COSINE = 0.85
 """A vertex normal further than some 32 degrees from a triangle's own belongs to a crease: it stays flat."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.elasticity import shape_derivatives
+from mechanics.elastic.elasticity import shape_derivatives
 from mechanics.errors import MeshError
 from mechanics.press_solver.felt_surface import FeltSurface
-from mechanics.tetmesh import EDGES, FACES, TetMesh, lone_faces
+from mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
 
 GAUSS = np.full((4, 4), 0.1381966011250105)
 GAUSS[np.arange(4), np.arange(4)] = 0.5854101966249685

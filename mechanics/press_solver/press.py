@@ -14,7 +14,7 @@ from mechanics.press_solver.even_surface import even_surface
 from mechanics.press_solver.felt_surface import FeltSurface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
 from mechanics.press_solver.settling import Settling
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.tetmesh import TetMesh
 
 _LONGEST = 1.3
 """Longest over typical edge of a tetrahedron."""
@@ -150,6 +150,8 @@ class PressSolver:
         across_faces = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         reach = far(corner.mean(axis=1)) < options.reach * last + 0.1 * tip
         faces = mesh.faces[reach & (across_faces @ normal > 0)]
+        if not len(faces):
+            raise OptionError(f"no element's face lies within the contact: finest is {options.finest:g}")
         near = np.zeros(len(mesh.cells), dtype=bool)
         if options.law != "linear":
             near = far(mesh.points[mesh.cells[:, :4]].mean(axis=1)) < options.zone * last

@@ -5,7 +5,7 @@ ratio (Nagtegaal, Parks & Rice 1974; Simo, Taylor & Pister 1985), h the family o
 mechanics.effects.strain_stiffening. Two energies, alike where nothing changes its volume:
 
     split      W(I1bar) + K (theta^2 / 4 - ln(theta) / 2), 2 dW/dI1bar = mu h(I1bar - 3)
-    coupled    W(I1) - mu ln J + lambda ln(theta)^2 / 2, 2 dW/dI1 = mu h(I1 - 3), as in mechanics/dent_*.csv
+    coupled    W(I1) - mu ln J + lambda ln(theta)^2 / 2, 2 dW/dI1 = mu h(I1 - 3), as the dent's tables
 
 The tangent of both at rest is the small-strain solid. Lengths m, stresses in units of the global Young's
 modulus.
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.elasticity import lame_parameters, shape_derivatives
+from mechanics.elastic.elasticity import lame_parameters, shape_derivatives
 from mechanics.kernels import kernel
 from mechanics.press_solver.graded_mesh import GAUSS
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mechanics.disk.reading import read_toml, reading, sha256_of_file
 from mechanics.errors import OptionError, RecordingError
-from mechanics.files import read_toml, reading, sha256_of_file
-from mechanics.recording import recording_files
+from mechanics.recording.files import recording_files
 from palpate.operations._declare import check_options
-from palpate.tasks.graph import Task
+from palpate.parallel.graph import Task
 
 STEPS = ("reconstruct", "compare", "diagnose")
 MODEL, THUMBNAIL = "model", "thumbnail.png"

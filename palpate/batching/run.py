@@ -6,14 +6,14 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
+from mechanics.disk.writing import Kind, atomic_file, sole_writer
 from mechanics.errors import PalpateError
-from mechanics.files import Kind, atomic_file, sole_writer
 from mechanics.progress import Progress
 from palpate.batching.plan import Choice, absolute, find, tasks_of, undescribed
 from palpate.batching.summary import Batch, agreements, entry_of, write_csv, write_parquet
-from palpate.tasks.driver import Outcome
-from palpate.tasks.engine import run_with_bar
-from palpate.tasks.graph import Graph, Task
+from palpate.parallel.driver import Outcome
+from palpate.parallel.engine import run_with_bar
+from palpate.parallel.graph import Graph, Task
 
 _TRACE = Kind("a trace", (b"Traceback",))
 
@@ -31,7 +31,7 @@ def batch(
 ) -> Batch:
     """Do what is not finished of all recordings; the summary is written when the user stops it, too.
 
-    Raises OptionError for sources that lead to nothing and what `tasks.engine.executor` refuses, FileError
+    Raises OptionError for sources that lead to nothing and what `parallel.engine.executor` refuses, FileError
     for an output that cannot be written or where another batch writes.
     """
     folder = absolute(out)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mechanics.disk.writing import PNG, atomic_file
 from mechanics.errors import RecordingError
-from mechanics.files import PNG, atomic_file
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from palpate.batching.plan import MODEL, STEPS, THUMBNAIL, content_of
 from palpate.operations.read_recording import read_recording
 from palpate.output import emit_json

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.files import Kind, atomic_file
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.result import Result
-from palpate.tasks.driver import Outcome
+from palpate.parallel.driver import Outcome
 
 _Z95 = 1.959964
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.disk.surface_files import UNITS
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import OptionError
-from mechanics.files import Kind, atomic_file
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.progress import Progress, silent
-from mechanics.surface_files import UNITS
 from palpate.exporting import abaqus, gmsh, mujoco, scripts, sofa, stl, usd
 from palpate.exporting.subject import Subject, subject_of
 

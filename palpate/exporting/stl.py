@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.surface_files import UNITS
+from mechanics.disk.surface_files import UNITS
 from palpate.exporting.subject import Subject
 
 HEADER = b"Palpate model"

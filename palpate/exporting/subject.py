@@ -11,9 +11,9 @@ from mechanics.effects.friction_slip import EFFECT as SLIP
 from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
 from mechanics.frames import tangents
-from mechanics.model import Model
-from mechanics.nearest import closest
-from mechanics.tetmesh import TetMesh
+from mechanics.model.model import Model
+from mechanics.shape.nearest import closest
+from mechanics.shape.tetmesh import TetMesh
 from render.simulators.base import graded
 
 USUAL_FRICTION = 0.5

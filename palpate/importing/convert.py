@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import RecordingError
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from palpate.importing.clocks import PARTS, POINTS_HZ, Stream, one_clock, slower_readings, stream_of
 from palpate.importing.frames import framed, is_on_tool, one_axis, tared
 from palpate.importing.mapping import Column, Said, find_columns

@@ -8,26 +8,31 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from diagnose.specimen.bench import Curve
 from mechanics.bounds import LARGEST_N
-from mechanics.errors import ContactError, RecordingError
-from mechanics.recording import WIDEST_PATH_M, NotRead
+from mechanics.errors import RecordingError
+from mechanics.recording.recording import NotRead
+from mechanics.recording.sane import WIDEST_PATH_M
+from palpate.importing.curve_meaning import (
+    RawCurves,
+    SaidOfCurves,
+    in_units,
+    say_signs,
+    signs_of,
+    unclear_signs,
+)
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import (
     MOST_ODDS,
-    Reading,
-    Unclear,
-    best,
     clock_of,
     clock_starts,
     joined,
-    press_scores,
     settled_clock,
 )
 from palpate.importing.sheets import SHEET_SUFFIXES, lines_of
@@ -38,44 +43,14 @@ from render.press import COLUMNS as PRESS_COLUMNS
 LEAST_ROWS = 8
 _HEAD = 40
 """Rows of a sheet in which the probe's radius may be said."""
-_INTO = ("depth", "indentation", "indent", "compression", "travel", "penetration")
-_OUT = ("height", "gap", "toolgap")
-_NAMED, _USUAL = float(np.log(6.0)), float(np.log(2.0))
-"""What a name tells of a direction, and that z points up, travel down, load into the sample (nats)."""
-_DEEPEST_RADII = 20.0
 _ENTER, _LEAVE, _RETREAT = 0.25, 0.08, 0.05
 """A press begins above this share of the greatest force; the next one after it fell below the second, and the
 tip moved out by the third of its way."""
-_LENGTH_FACTOR = 4.0
-_USUAL_E, _E_FACTOR = 2e4, 20.0
 _RADIUS = re.compile(
     r"\b(?:probe|tip|indenter|sphere|ball|bead)\b[^\n]{0,20}?\b(radius|diameter)\b[^\n\d]{0,12}?"
     r"(?:[\[(]\s*(m|mm|um|µm|nm)\s*[\])])?\s*[:=,;\t ]*\s*(\d+(?:[.,]\d+)?(?:e-?\d+)?)\s*(m|mm|um|µm|nm)?\b",
     re.IGNORECASE,
 )
-
-
-@dataclass(frozen=True)
-class SaidOfCurves:
-    """What was said. columns, units: as of `palpate import`, with the roles depth, height and load too.
-    travel: "into" or "out"; compression: "positive" or "negative" load; clock: "one" or "blocks"."""
-
-    columns: Mapping[str, str] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
-    travel: str | None = None
-    compression: str | None = None
-    clock: str | None = None
-
-
-@dataclass(frozen=True)
-class _Raw:
-    """One table in SI, signs as in the file. t None: no column of time."""
-
-    path: Path
-    t: np.ndarray
-    position: np.ndarray
-    load: np.ndarray
-    columns: Mapping[str, Column]
 
 
 @dataclass(frozen=True)
@@ -97,14 +72,14 @@ def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float) 
     raws = [_raw(path, said, notes, odds) for path in paths]
     for raw in raws:
         _check_sizes(raw)
-    signs = _signs(raws, said, stated)
+    signs = signs_of(raws, said, stated)
     if not signs.sure:
-        raise _unclear_signs(raws[0], signs)
+        raise unclear_signs(raws[0], signs)
     odds.append(signs.odds)
     travel, load = signs.value
-    _say_signs(raws[0], signs, notes)
+    say_signs(raws[0], signs, notes)
     curves = [c for raw in raws for c in _presses(raw, travel, load, notes)]
-    curves = _in_units(raws[0], curves, tip_radius_m, notes, odds)
+    curves = in_units(raws[0], curves, tip_radius_m, notes, odds)
     return CurvesRead(tuple(curves), tuple(dict.fromkeys(notes)), min(odds))
 
 
@@ -142,7 +117,7 @@ def _aliases(said: SaidOfCurves) -> tuple[SaidOfCurves, tuple[int | None, int | 
     return SaidOfCurves(columns, said.units, said.travel, said.compression, said.clock), (travel, load)
 
 
-def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -> _Raw:
+def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -> RawCurves:
     tables = read_tables(path)
     if not said.columns and tuple(tables[0].columns) == PRESS_COLUMNS:
         return _of_press(path, tables[0], notes)
@@ -166,10 +141,10 @@ def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) ->
     fresh = np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])[: len(t)]
     if fresh.sum() < LEAST_ROWS:
         raise RecordingError(f"'{path}' has {fresh.sum()} rows in order of time: {LEAST_ROWS} are needed")
-    return _Raw(path, t[fresh], z[fresh], push[fresh], columns)
+    return RawCurves(path, t[fresh], z[fresh], push[fresh], columns)
 
 
-def _of_press(path: Path, table: Table, notes: list[str]) -> _Raw:
+def _of_press(path: Path, table: Table, notes: list[str]) -> RawCurves:
     """The curve of a `palpate press`, along its own line, which may lie aslant: m and N."""
     t, *position, _ = (np.asarray(table.columns[name], float) for name in PRESS_COLUMNS[:5])
     force = np.column_stack([table.columns[name] for name in PRESS_COLUMNS[5:]])
@@ -184,7 +159,7 @@ def _of_press(path: Path, table: Table, notes: list[str]) -> _Raw:
         role: Column(role, table, name, 1.0, unit, guessed=False)
         for role, name, unit in (("t", "t", "s"), ("z", "travel", "m"), ("fz", "push", "N"))
     }
-    return _Raw(path, t, way @ along, -force @ along, columns)
+    return RawCurves(path, t, way @ along, -force @ along, columns)
 
 
 def _one_clock(
@@ -203,7 +178,7 @@ def _one_clock(
     return joined(t), z, push
 
 
-def _check_sizes(raw: _Raw) -> None:
+def _check_sizes(raw: RawCurves) -> None:
     """Raise for lengths and loads that no machine has."""
     travelled = float(np.ptp(raw.position))
     if travelled > WIDEST_PATH_M:
@@ -217,44 +192,7 @@ def _check_sizes(raw: _Raw) -> None:
         )
 
 
-def _signs(raws: Sequence[_Raw], said: SaidOfCurves, stated: tuple[int | None, int | None]) -> Reading:
-    """(travel, load) signs of all files together, which are of one machine."""
-    scores: dict[tuple[int, ...], float] = {(a, b): 0.0 for a in (1, -1) for b in (1, -1)}
-    for raw in raws:
-        for signs, score in press_scores(raw.position, raw.load).items():
-            scores[signs] += score
-    name = re.sub(r"[^a-z]", "", without_unit(raws[0].columns["z"].name).lower())
-    into = _NAMED if name in _INTO else -_NAMED if name in _OUT else -_USUAL if name == "z" else _USUAL
-    for a, b in list(scores):
-        scores[a, b] += into * (a > 0) + _USUAL * (b > 0)
-    kept = {
-        key: score
-        for key, score in scores.items()
-        if all(want is None or want == got for want, got in zip(stated, key, strict=True))
-    }
-    return best(kept)
-
-
-def _unclear_signs(raw: _Raw, signs: Reading) -> RecordingError:
-    z, fz = raw.columns["z"].name, raw.columns["fz"].name
-    return Unclear(
-        f"'{raw.path}': whether '{fz}' is positive or negative in compression cannot be told from how it "
-        f"goes with '{z}' ({signs.words}; if these are the wrong columns, --column depth=NAME and "
-        "--column load=NAME name them)",
-        "compression",
-        ("positive", "negative"),
-    )
-
-
-def _say_signs(raw: _Raw, signs: Reading, notes: list[str]) -> None:
-    travel, load = signs.value
-    z, fz = raw.columns["z"].name, raw.columns["fz"].name
-    way = "into the sample" if travel > 0 else "out of the sample"
-    sign = "positive" if load > 0 else "negative"
-    notes.append(f"'{z}' counts {way}, '{fz}' is {sign} in compression ({signs.words})")
-
-
-def _presses(raw: _Raw, travel: int, load: int, notes: list[str]) -> list[Curve]:
+def _presses(raw: RawCurves, travel: int, load: int, notes: list[str]) -> list[Curve]:
     """A curve a press: cut where the tip is farthest out between two."""
     u, f = travel * raw.position, load * raw.load
     level = np.median(f[: max(3, len(f) // 50)])
@@ -281,73 +219,6 @@ def _presses(raw: _Raw, travel: int, load: int, notes: list[str]) -> list[Curve]
     return [
         Curve(raw.t[a:b], u[a:b], f[a:b], f"{raw.path.name}, press {k + 1}") for k, (a, b) in enumerate(spans)
     ]
-
-
-def _in_units(
-    raw: _Raw, curves: Sequence[Curve], tip_radius_m: float, notes: list[str], odds: list[float]
-) -> list[Curve]:
-    """The curves in the units that their dent and stiffness tell, where nobody said them. Raises Unclear
-    where two may be meant, ContactError where no tip goes so deep."""
-    depth, push = (float(np.median(v)) for v in zip(*map(_dent, curves), strict=True))
-    z, fz = raw.columns["z"], raw.columns["fz"]
-    length = force = 1.0
-    if z.assumed and depth > 0:
-        sizes = {unit: depth * SI["position"][unit] / (0.5 * tip_radius_m) for unit in _LENGTHS}
-        length = _likely(sizes, _LENGTHS, _LENGTH_FACTOR, "position", raw, notes, odds)
-    depth *= length
-    if depth > _DEEPEST_RADII * tip_radius_m:
-        raise ContactError(
-            f"'{raw.path}': the tip would go {depth:.3g} m deep, {depth / tip_radius_m:.0f} of its radii: "
-            f"are the units and signs of '{z.name}' and '{fz.name}' right? say --units position=mm, --column "
-            "depth=NAME, --column load=NAME, or --tip-radius M"
-        )
-    if fz.assumed and depth > 0 and push > 0:
-        modulus = push / (16 / 9 * np.sqrt(tip_radius_m) * depth**1.5)
-        moduli = {unit: modulus * SI["force"][unit] / _USUAL_E for unit in _FORCES}
-        force = _likely(moduli, _FORCES, _E_FACTOR, "force", raw, notes, odds)
-    if length == force == 1.0:
-        return list(curves)
-    return [Curve(c.t, length * c.travel, force * c.force, c.name) for c in curves]
-
-
-def _likely(
-    sizes: Mapping[str, float], priors: Mapping[str, float], factor: float, kind: str, raw: _Raw,
-    notes: list[str], odds: list[float],
-) -> float:  # fmt: skip
-    """What one is in SI of the likeliest unit: sizes are over the usual one, which is known to a factor."""
-    units = list(sizes)
-    reading = best(
-        {
-            (k,): float(np.log(priors[unit]) - 0.5 * (np.log(sizes[unit]) / np.log(factor)) ** 2)
-            for k, unit in enumerate(units)
-        }
-    )
-    unit, name = units[reading.value[0]], raw.columns["z" if kind == "position" else "fz"].name
-    if not reading.sure:
-        other = unit if unit != units[0] else units[1]
-        raise Unclear(
-            f"'{raw.path}': the unit of '{name}' is said nowhere, and two are likely ({reading.words})",
-            "units",
-            (f"{kind}={other}", f"{kind}={units[0]}"),
-        )
-    odds.append(reading.odds)
-    if unit != units[0]:
-        notes.append(f"'{name}' names no unit: taken as {unit} ({reading.words})")
-    return SI[kind][unit]
-
-
-_LENGTHS = {"m": 1.0, "mm": 1.0, "um": 0.3}
-_FORCES = {"N": 0.85, "mN": 0.1, "gf": 0.05}
-"""Units that a column may be in that says none."""
-
-
-def _dent(curve: Curve) -> tuple[float, float]:
-    """(depth m, force N) of a press at its peak."""
-    force = curve.force - np.median(curve.force[: max(3, len(curve.force) // 50)])
-    peak = int(np.argmax(force))
-    way = curve.travel[: peak + 1]
-    first = np.flatnonzero(force[: peak + 1] < 0.05 * force[peak])
-    return float(way[-1] - way[first[-1] if len(first) else 0]), float(force[peak])
 
 
 def numbers_in(path: Path, *columns: np.ndarray) -> np.ndarray:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mechanics.files import atomic_file
-from mechanics.recording import Recording
+from mechanics.disk.writing import atomic_file
+from mechanics.recording.recording import Recording
 from mechanics.result import Result
 from palpate.importing.convert import Understood
 from palpate.importing.write_imported import PICTURE, picture, write_imported

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from mechanics.disk.reading import no_file
+from mechanics.disk.surface_files import is_surface_file
 from mechanics.errors import RecordingError
-from mechanics.files import no_file
-from mechanics.surface_files import is_surface_file
 from palpate.importing.mapping import Said, find_columns
 from palpate.importing.specimens import is_chiaro, kind_of
 from palpate.importing.tables import TEXT_SUFFIXES, read_tables

@@ -25,10 +25,10 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.disk.reading import read_toml
+from mechanics.disk.schema import ANY, Key, Schema, check_table
 from mechanics.errors import RecordingError
-from mechanics.files import read_toml
-from mechanics.recording import SCHEMA
-from mechanics.schema import ANY, Key, Schema, check_table
+from mechanics.recording.files import SCHEMA
 from palpate.importing.tables import Table
 from palpate.importing.units import SI, plain, unit_in, without_unit
 

@@ -16,12 +16,13 @@ import numpy as np
 from diagnose.specimen.bench import Curve
 from diagnose.specimen.result import MachineTests
 from mechanics.errors import OptionError, RecordingError
-from palpate.importing.curves import LEAST_ROWS, SaidOfCurves, numbers_in, read_curves, stated_radius
+from palpate.importing.curve_meaning import SaidOfCurves
+from palpate.importing.curves import LEAST_ROWS, numbers_in, read_curves, stated_radius
 from palpate.importing.meaning import MOST_ODDS, Unclear
 from palpate.importing.sheets import SHEET_SUFFIXES
 from palpate.importing.tables import TEXT_SUFFIXES, read_tables
-from reconstruct.external.indentation import read_chiaro
-from reconstruct.external.uniaxial import of_compression, read_tension
+from reconstruct.machine_curves.indentation import read_chiaro
+from reconstruct.machine_curves.uniaxial import of_compression, read_tension
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.disk.reading import bounded_memory, no_file
 from mechanics.errors import RecordingError
-from mechanics.files import bounded_memory, no_file
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.files import Kind, atomic_file
-from mechanics.recording import (
-    DESCRIPTION,
-    QUATERNION_COLUMNS,
-    REQUIRED_COLUMNS,
-    SAMPLES,
-    samples_path,
-)
-from mechanics.toml_text import dump_toml
+from mechanics.disk.toml_text import dump_toml
+from mechanics.disk.writing import Kind, atomic_file
+from mechanics.recording.files import DESCRIPTION, SAMPLES, samples_path
+from mechanics.recording.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS
 from palpate.importing.convert import Understood
 from palpate.show.page import subplots
 

@@ -24,8 +24,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+from mechanics.disk.writing import FolderKind, Kind, check_target
 from mechanics.errors import OptionError
-from mechanics.files import FolderKind, Kind, check_target
 from mechanics.names import near, unknown
 from mechanics.options import option, span_of
 from mechanics.progress import Progress, silent
@@ -50,8 +50,9 @@ class OnCommandLine:
     metavar: its value in help; short: another spelling, as -o; positional: without a flag; count: argparse's
     nargs ("?", "+", "*", "..."), or "repeat" for a flag that may be given several times; parse: from text to
     the value; reads: names a file or folder that is read; writes: one that is written, its
-    `mechanics.files.Kind`, or where that is as "module:NAME"; needed: on the command line, though it has a
-    default; only: "command" or "python" where it is one's alone; rare: `--help` leaves it to `--help-all`.
+    `mechanics.disk.writing.Kind`, or where that is as "module:NAME"; needed: on the command line, though it
+    has a default; only: "command" or "python" where it is one's alone; rare: `--help` leaves it to
+    `--help-all`.
     """
 
     metavar: str = ""

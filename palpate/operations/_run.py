@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from mechanics.disk.scratch import sweep_scratch
+from mechanics.disk.writing import FolderKind, Kind, check_target, written_at
 from mechanics.errors import OptionError, PalpateError
-from mechanics.files import FolderKind, Kind, check_target, written_at
-from mechanics.scratch import sweep_scratch
 from palpate.operations._declare import STREAMS, Operation
 from palpate.operations._list import OPERATIONS, module_of
 from palpate.operations._to_argparse import OneLineParser, add_operation
@@ -116,7 +116,7 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
 
 def _files_of(path: Path) -> list[Path]:
     """What is read where `path` is named: both files of a recording, a folder with all in it."""
-    from mechanics.recording import recording_files
+    from mechanics.recording.files import recording_files
 
     with contextlib.suppress(PalpateError, OSError):
         return list(recording_files(path))

@@ -6,27 +6,28 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mechanics.disk.surface_files import UNITS, is_surface_file
 from mechanics.errors import OptionError
 from mechanics.key_values import pairs
-from mechanics.surface_files import UNITS, is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand
 from palpate.operations._to_argparse import natural
 from render.registry import names, simulator_names
 
 if TYPE_CHECKING:
-    import mechanics.model
-    import mechanics.recording
+    import mechanics.model.model
+    import mechanics.recording.recording
     from reconstruct.pipeline import Reconstruction
     from render.options import RenderOptions
     from scenes.laboratory.simulate import Simulation
     from scenes.scene import Scene
 
-    RecordingLike = str | Path | mechanics.recording.Recording | Simulation
-    ModelLike = str | Path | mechanics.model.Model | Reconstruction | Scene
+    RecordingLike = str | Path | mechanics.recording.recording.Recording | Simulation
+    ModelLike = str | Path | mechanics.model.model.Model | Reconstruction | Scene
 
+EXACT = "solve each touched place in place of reading the table (some 10 s of processor time a place)"
 PAGE = "palpate.show.page:PAGE"
-MODEL = "mechanics.model_files:MODEL"
-SAMPLES = "mechanics.recording:SAMPLES"
+MODEL = "mechanics.model.files:MODEL"
+SAMPLES = "mechanics.recording.files:SAMPLES"
 
 
 def recording_operand(

@@ -14,9 +14,9 @@ from render.registry import simulator_names
 if TYPE_CHECKING:
     import numpy as np
 
-    from mechanics.model import Model
+    from mechanics.model.model import Model
     from mechanics.progress import Progress
-    from mechanics.recording import Recording
+    from mechanics.recording.recording import Recording
     from render.simulators.base import Adapter
 
 
@@ -81,8 +81,8 @@ def run_along(
     """Run a simulator along a recording's presses, `most` of them, spread over its places (None: all; usual:
     as many as the adapter takes). Raises OptionError where it is not installed, a setting is not there, or it
     finds no answer."""
-    from diagnose.simulated.chosen import spread_out
-    from reconstruct.placing import presses_on
+    from diagnose.other_simulator.presses_to_run import spread_out
+    from reconstruct.presses_on_model import presses_on
     from render.registry import create
     from render.replay import replay_touches
 

@@ -10,8 +10,8 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
+from mechanics.disk.writing import JSON
 from mechanics.errors import OptionError
-from mechanics.files import JSON
 from mechanics.names import near, unknown
 from mechanics.options import check_range, flag_of
 from palpate.operations._declare import GREATEST, OnCommandLine, Operation, declared, written

@@ -21,7 +21,7 @@ from palpate.output import Output
 from reconstruct.geometry.stated import GeometryOptions
 
 if TYPE_CHECKING:
-    from mechanics.calibration import Calibration
+    from mechanics.recording.calibration import Calibration
     from palpate.operations._shared import RecordingLike
 
 
@@ -32,7 +32,7 @@ class CalibrateOperands:
     recording: RecordingLike = recording_operand()
     _: KW_ONLY
     save: str | Path | None = save_operand(
-        "calibration to write, which recordings may name", "TOOL.toml", "mechanics.calibration:TOOL"
+        "calibration to write, which recordings may name", "TOOL.toml", "mechanics.recording.calibration:TOOL"
     )
     rigid: bool = operand(False, "the presses are on a rigid plate")
     modulus_pa: float | None = operand(
@@ -66,7 +66,7 @@ def calibrate(asked: CalibrateOperands, call: Call) -> Calibration:
     """
     from diagnose.calibrate.on_object import calibrate_on_object
     from diagnose.calibrate.on_plate import calibrate_on_plate
-    from reconstruct.geometry.placed import nowhere
+    from reconstruct.geometry.in_device_frame import nowhere
     from reconstruct.steps.s3_contacts.contacts import explore
 
     if asked.rigid == (asked.modulus_pa is not None):

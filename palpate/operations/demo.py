@@ -12,8 +12,8 @@ import sys
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 
-from mechanics.files import check_target, sole_writer
-from mechanics.model_files import MODEL
+from mechanics.disk.writing import check_target, sole_writer
+from mechanics.model.files import MODEL
 from palpate.demo import DemoOptions, DemoResult, run_demo
 from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import recording_operand, seed_operand

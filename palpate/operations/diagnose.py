@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from diagnose.forward.touches import LEAST_PRESSES
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
-from diagnose.simulated.forces import ForcesOptions
+from diagnose.other_simulator.forces import ForcesOptions
 from mechanics.errors import OptionError
 from mechanics.progress import part
 from palpate.operations._declare import Call, operand, operation
@@ -45,11 +45,11 @@ from palpate.output import Output
 from render.registry import check_settings
 
 if TYPE_CHECKING:
-    from diagnose.simulated.result import SimulatedGap
+    from diagnose.other_simulator.result import SimulatedGap
     from diagnose.verdict.result import Diagnosis
-    from mechanics.model import Model
+    from mechanics.model.model import Model
     from mechanics.progress import Progress
-    from mechanics.recording import Recording
+    from mechanics.recording.recording import Recording
     from palpate.operations._shared import ModelLike, RecordingLike
 
 
@@ -153,7 +153,7 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
     simulation lacks. Raises DiagnosisError where the data cannot carry it.
     """
     from diagnose.pipeline import diagnose as diagnosed
-    from reconstruct.placing import presses_on
+    from reconstruct.presses_on_model import presses_on
 
     forces = _forces(asked)
 
@@ -178,9 +178,9 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
 
         if asked.renderer is None and forces is None:
             return diagnosed(measured, made, options, rest, **rules)
-        from diagnose.simulated.pipeline import Asked, diagnose_simulated
-        from diagnose.simulated.result import Mended
-        from diagnose.simulated.stated import stated_of
+        from diagnose.other_simulator.pipeline import Asked, diagnose_simulated
+        from diagnose.other_simulator.result import Mended
+        from diagnose.other_simulator.stated import stated_of
 
         if forces is not None:
             simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
@@ -213,9 +213,9 @@ def _simulation(
     tell: Progress,
 ) -> Any:
     """A simulator that is run along the recorded path; and what it says of itself."""
-    from diagnose.simulated.forces import Forces
-    from diagnose.simulated.pipeline import Asked
-    from diagnose.simulated.stated import stated_of, stated_values
+    from diagnose.other_simulator.forces import Forces
+    from diagnose.other_simulator.pipeline import Asked
+    from diagnose.other_simulator.stated import stated_of, stated_values
 
     assert asked.renderer is not None
     ran = run_along(asked.renderer, settings, numbers, model, measured, tell, most=asked.presses, usual=True)
@@ -250,12 +250,12 @@ def _forces(asked: DiagnoseOperands) -> Any:
             words = "name its forces by --simulated, or the simulator by --renderer"
             raise OptionError(f"--stated says what a simulator was given: {words}")
     if asked.stated:
-        from diagnose.simulated.stated import stated_values
+        from diagnose.other_simulator.stated import stated_values
 
         stated_values(asked.stated)
     if asked.simulated is None:
         return None
-    from diagnose.simulated.forces import read_forces, sorted_forces
+    from diagnose.other_simulator.forces import read_forces, sorted_forces
 
     if isinstance(asked.simulated, tuple | list):
         import numpy as np

@@ -25,7 +25,7 @@ from diagnose.explore.segments import Instrument
 from mechanics.errors import OptionError
 from mechanics.options import check_ranges
 from mechanics.quantities import POISSON_RATIO
-from mechanics.recording import read_recording
+from mechanics.recording.recording import read_recording
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._run import say_next
 from palpate.operations._shared import (

@@ -30,7 +30,7 @@ from palpate.operations._to_argparse import finite, vector
 from palpate.output import Output
 
 if TYPE_CHECKING:
-    from mechanics.recording import Recording
+    from mechanics.recording.recording import Recording
     from palpate.importing.imported import Imported
 
 

@@ -10,7 +10,7 @@ from mechanics.errors import OptionError
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 
 if TYPE_CHECKING:
-    from mechanics.model import Model
+    from mechanics.model.model import Model
     from palpate.operations._shared import ModelLike
 
 
@@ -32,8 +32,8 @@ def load(asked: LoadOperands, call: Call) -> Model:
 
     Moduli Pa, lengths m, device frame. Raises ModelError or SceneError where there is none.
     """
-    from mechanics.model import Model as Plain
-    from mechanics.model_files import read_model
+    from mechanics.model.files import read_model
+    from mechanics.model.model import Model as Plain
     from scenes.build import model_of as scene_model
     from scenes.scene import Scene, load_scene
 

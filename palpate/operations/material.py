@@ -85,7 +85,7 @@ def material(asked: MaterialOperands, call: Call) -> Material:
 
 def _made(asked: MaterialOperands, call: Call) -> Material:
     from diagnose.specimen.material import material_of
-    from palpate.importing.curves import SaidOfCurves
+    from palpate.importing.curve_meaning import SaidOfCurves
     from palpate.importing.specimens import read_tests
 
     tests = read_tests(

@@ -11,8 +11,8 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mechanics.disk.surface_files import is_surface_file
 from mechanics.errors import OptionError
-from mechanics.surface_files import is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._shared import (
     MODEL,
@@ -23,7 +23,7 @@ from palpate.operations._shared import (
 )
 
 if TYPE_CHECKING:
-    from mechanics.model import Model
+    from mechanics.model.model import Model
 
 
 @dataclass(frozen=True)

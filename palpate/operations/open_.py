@@ -29,7 +29,7 @@ from palpate.operations._shared import (
 from palpate.output import Output
 
 if TYPE_CHECKING:
-    from mechanics.recording import Recording
+    from mechanics.recording.recording import Recording
     from palpate.importing.opened import Opened
 
 
@@ -97,7 +97,7 @@ def open(asked: OpenOperands, call: Call) -> Opened:
 
 
 def _opened(asked: OpenOperands, call: Call) -> Opened:
-    from mechanics.recording import Recording as Plain
+    from mechanics.recording.recording import Recording as Plain
     from palpate.importing.kinds import kind_of_file
 
     kind = "recording" if isinstance(asked.files[0], Plain) else kind_of_file(

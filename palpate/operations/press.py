@@ -13,10 +13,11 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mechanics.surface_files import is_surface_file
+from mechanics.disk.surface_files import is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._run import say_next
 from palpate.operations._shared import (
+    EXACT,
     MeshFileOptions,
     given_model,
     model_operand,
@@ -58,6 +59,7 @@ class PressOperands:
     rate_hz: float = operand(1000.0, "samples a second", unit="Hz", rare=True)
     tip_radius_m: float | None = tip_radius_operand("of the tool; None: the model's")
     renderer: str = renderer_operand()
+    exact: bool = operand(False, EXACT)
     output: str | None = output_operand("write the curve", "CURVE.csv", "render.press:CURVE")
     expect: str | None = operand(
         None, "a curve to compare with", metavar="CURVE.csv", reads=True, only="command"
@@ -113,20 +115,31 @@ def press(asked: PressOperands, call: Call) -> Curve:
     """
     import numpy as np
 
-    from render.press import Stroke, read_curve
+    from render.exact import ExactPlaces, check_renderer, said_beforehand
+    from render.press import Stroke, read_curve, solved
     from render.press import press as pressed
 
     if asked.expect:
         read_curve(asked.expect)  # before the work
+    if asked.exact:
+        check_renderer(asked.renderer)
     make = touched_scene(given_model(asked.model, call, "a"), asked.renderer, call)
     with call.progress("press") as tell:
         scene = make(tell)
+    places = None
+    if asked.exact:
+        places = ExactPlaces(scene.renderer, asked.tip_radius_m)
+        call.out.say(f"--exact: {said_beforehand(1)}")
     straight = asked.direction is None
     radius = scene.model.tool.tip_radius_m if asked.tip_radius_m is None else float(asked.tip_radius_m)
-    return pressed(
+    curve = pressed(
         scene,
         np.asarray(asked.at, dtype=float),
         -scene.model.support.normal if straight else np.asarray(asked.direction, dtype=float),
         Stroke(asked.depth_m, asked.speed_m_per_s, asked.hold_s, asked.approach_m, asked.rate_hz),
         radius,
     )
+    if places is None:
+        return curve
+    with call.progress("solving the place"):
+        return solved(curve, places)

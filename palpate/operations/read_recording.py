@@ -11,7 +11,7 @@ from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._shared import tip_radius_operand
 
 if TYPE_CHECKING:
-    from mechanics.recording import Recording
+    from mechanics.recording.recording import Recording
     from palpate.operations._shared import RecordingLike
 
 
@@ -29,16 +29,18 @@ def read_recording(asked: ReadOperands, call: Call) -> Recording:
     Times s, positions of the tip's centre m, forces on the tool N, device frame.
     Raises RecordingError for what is missing or impossible.
     """
-    from mechanics.recording import Recording as Plain
-    from mechanics.recording import check_sane
-    from mechanics.recording import read_recording as read
+    from mechanics.recording.recording import Recording as Plain
+    from mechanics.recording.recording import read_recording as read
+    from mechanics.recording.sane import check_sane
     from scenes.embedded import embedded_names, embedded_recording
 
     source = asked.source
     held = source if isinstance(source, Plain) else getattr(source, "recording", None)
     if isinstance(held, Plain):
         try:
-            check_sane(held)  # arrays get what files get
+            check_sane(
+                held.t, held.sample_rate_hz, held.position, held.force_on_tool
+            )  # arrays get what files get
         except RecordingError as error:
             words = "pp.recording(t, position, force, tip_radius=..., units=...) takes arrays in other units"
             raise RecordingError(f"{error}; {words}") from error

@@ -69,8 +69,8 @@ class ReconstructOperands:
 
 
 def _answer(result: Reconstruction, asked: ReconstructOperands, out: Output) -> int:
-    from mechanics.compliance import load_or_condense
-    from mechanics.model_files import read_model
+    from mechanics.compliance.compliance import load_or_condense
+    from mechanics.model.files import read_model
 
     out.say(*result.lines(), f"written to {asked.save}")
     if asked.report:
@@ -97,9 +97,9 @@ def reconstruct(asked: ReconstructOperands, call: Call) -> Reconstruction:
     goes; its `doubt` says why it is not to be believed, '' where nothing speaks against it. Lengths m, forces
     N. Raises OptionError, ContactError, SurfaceError or MeshError.
     """
-    from mechanics.model_files import read_model
+    from mechanics.model.files import read_model
     from reconstruct.pipeline import reconstruct_fully
-    from render.felt_surface import felt_surface
+    from render.surface.felt_surface import felt_surface
 
     for name in asked.beside:
         read_model(name)  # before the work

@@ -47,8 +47,8 @@ def renderer(asked: RendererOperands, call: Call) -> Renderer:
 def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], TouchScene]:
     """What will make the renderer, on its model's support; options are looked at at once."""
     from render.base import Renderer
-    from render.felt_surface import with_own_stiffness
     from render.scene import scene_of
+    from render.surface.felt_surface import with_own_stiffness
 
     support = call.of(SupportOptions)
     if isinstance(model, Renderer):

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING
 
 from mechanics.errors import ContactError, OptionError
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._shared import output_operand, recording_operand, renderer_operand
+from palpate.operations._shared import EXACT, output_operand, recording_operand, renderer_operand
 from palpate.operations.read_recording import read_recording
 from palpate.operations.renderer import touched_scene
 from render.options import RenderOptions
 from render.support import SupportOptions
 
 if TYPE_CHECKING:
-    import mechanics.model
-    import mechanics.recording
-    from mechanics.presses import Presses
+    import mechanics.model.model
+    import mechanics.recording.recording
+    from mechanics.presses.table import Presses
     from palpate.operations._shared import ModelLike, RecordingLike
     from render.base import Renderer
     from render.replay import ReplayResult
@@ -37,6 +37,7 @@ class ReplayOperands:
     recording: RecordingLike = recording_operand()
     renderer: str = renderer_operand()
     _: KW_ONLY
+    exact: bool = operand(False, EXACT)
     output: str | None = output_operand("write the forces", "FORCES.csv", "render.replay:FORCES")
 
 
@@ -48,10 +49,19 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     mask `contact`, and the error rmse_n, N, over it. The same input gives the same bits. Raises OptionError,
     and ContactError for a recording that lies far from the model.
     """
-    from reconstruct.placing import check_near
+    from reconstruct.presses_on_model import check_near
     from reconstruct.steps.s3_contacts.quasi_static import is_points
+    from render.exact import (
+        ExactPlaces,
+        check_renderer,
+        deepest_of_sites,
+        exact_replay,
+        said_beforehand,
+    )
     from render.replay import ReplayResult, replay_error, replay_recording
 
+    if asked.exact:
+        check_renderer(asked.renderer)
     make = touched_scene(asked.model, asked.renderer, call)
     measured = read_recording(asked.recording)
     if is_points(measured):
@@ -63,7 +73,14 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         scene = make(tell)
         check_near(measured, scene.model)
         forces = replay_recording(scene, measured, tell)
-    error = replay_error(measured, _touched(measured, scene.model), forces)
+    presses, exact = _touched(measured, scene.model), None
+    if asked.exact:
+        places = ExactPlaces(scene.renderer, measured.tip_radius_m)
+        call.out.say(f"--exact: {said_beforehand(len(deepest_of_sites(presses)))}")
+        with call.progress("solving") as tell:
+            exact = exact_replay(places, presses, measured.t, measured.position, forces, tell)
+        forces = exact.force_n
+    error = replay_error(measured, presses, forces)
     return ReplayResult(
         **vars(error),
         recording=measured,
@@ -72,13 +89,16 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         t=measured.t,
         force_n=forces,
         used=scene.renderer,
+        exact=exact,
     )
 
 
-def _touched(recording: mechanics.recording.Recording, model: mechanics.model.Model) -> Presses:
+def _touched(
+    recording: mechanics.recording.recording.Recording, model: mechanics.model.model.Model
+) -> Presses:
     """The recording's presses on the model; none where it holds none."""
-    from mechanics.press_making import no_presses
-    from reconstruct.placing import presses_on
+    from mechanics.presses.making import no_presses
+    from reconstruct.presses_on_model import presses_on
 
     try:
         return presses_on(recording, model)

@@ -15,8 +15,8 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mechanics.disk.writing import JSON, PNG, atomic_file
 from mechanics.errors import OptionError
-from mechanics.files import JSON, PNG, atomic_file
 from mechanics.key_values import number, pairs
 from mechanics.names import unknown
 from palpate.operations._declare import REQUIRED, Call, operand, operation

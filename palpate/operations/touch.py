@@ -23,9 +23,9 @@ import numpy as np
 from devices.channel import PoseChannel
 from devices.mapper import MapperOptions, Mapping
 from devices.registry import DEVICES, DeviceChoice, options_of, spec_of
+from mechanics.disk.writing import PNG
 from mechanics.errors import DeviceError, OptionError
-from mechanics.files import PNG
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.names import unknown
 from mechanics.progress import Progress
 from palpate.operations._declare import Call, operand, operation

@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 from diagnose.explore.explorer import Suggestion
 from diagnose.explore.segments import Instrument, Segment
 from mechanics.errors import SceneError
-from mechanics.nearest import closest, first_hits
 from mechanics.options import option
+from mechanics.shape.nearest import closest, first_hits
 from scenes.laboratory.curves import ALONE, Solving
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.frame import quaternions

@@ -18,7 +18,7 @@ import numpy as np
 from devices.mapper import Mapping
 from devices.registry import DeviceChoice
 from mechanics.errors import DeviceError, PalpateError
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.progress import Progress, silent
 from palpate.servo.layout import BEAT, ENABLE, STOP, SharedArrays, SharedBlock
 from palpate.servo.options import ServoOptions

@@ -3,7 +3,7 @@
 The loop never waits for this thread, nor for the interpreter's lock that it needs; poses and commands pass
 through two seqlocked blocks. A command comes with the time for which it may act: where no tick has come by
 then it sends zero, and zero is the last thing it sends, whatever ended it. A driver's own dead man's switch
-comes after this one. Each pose carries the work of what was held (palpate.servo.held_force).
+comes after this one. Each pose carries the work of what was held (palpate.servo.work_on_hand).
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from devices.mapper import Mapping
 from mechanics.errors import PalpateError
 from mechanics.state import TipState
 from palpate.servo.clock import COMPILED
-from palpate.servo.held_force import HeldForce
 from palpate.servo.layout import DEADLINE, ENABLE, STOP
 from palpate.servo.loop import ServoLoop
 from palpate.servo.tick import (
@@ -48,6 +47,7 @@ from palpate.servo.tick import (
     put_pose,
     take_command,
 )
+from palpate.servo.work_on_hand import HeldForce
 
 ENABLING_S = 0.25
 ZERO = np.zeros(3)

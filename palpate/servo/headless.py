@@ -13,8 +13,8 @@ from devices.intention import FreeExploration
 from devices.mapper import Mapping
 from devices.registry import DeviceChoice
 from mechanics.errors import DeviceError
-from mechanics.model import Model
-from mechanics.model_files import read_model
+from mechanics.model.files import read_model
+from mechanics.model.model import Model
 from mechanics.progress import Progress, silent
 from palpate.servo.client import Servo
 from palpate.servo.options import ServoOptions

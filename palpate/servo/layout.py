@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.files import writing
-from mechanics.scratch import memory_folder, temporary_prefix
+from mechanics.disk.scratch import memory_folder, temporary_prefix
+from mechanics.disk.writing import writing
 from palpate.servo.histogram import BINS
 
 RING_ROWS = 8192

@@ -24,7 +24,7 @@ from devices.mapper import MapperOptions, Mapping
 from devices.registry import DeviceChoice
 from devices.safety import safety_parameters
 from mechanics.errors import DeviceError, OptionError, PalpateError
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.servo.device_thread import DeviceThread
 from palpate.servo.layout import ENABLE, MOST_TIPS, STOP, SharedBlock
 from palpate.servo.loop import Program, ServoLoop, make_program

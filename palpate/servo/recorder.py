@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import RecordingError
-from mechanics.recording import Recording, write_recording
+from mechanics.recording.recording import Recording, write_recording
 from palpate.servo.client import Servo
 from palpate.servo.layout import ROW
 

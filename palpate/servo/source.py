@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from mechanics.model import Model
-from mechanics.model_files import read_model, write_model
+from mechanics.disk.scratch import sweep, temporary_prefix
+from mechanics.model.files import read_model, write_model
+from mechanics.model.model import Model
 from mechanics.progress import Progress
-from mechanics.scratch import sweep, temporary_prefix
 
 
 class RendererSource(Protocol):

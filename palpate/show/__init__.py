@@ -36,9 +36,9 @@ if TYPE_CHECKING:
     from palpate.show.view3d import View
 
 _KINDS: dict[str, str | ModuleType] = {
-    "mechanics.recording.Recording": "recording",
-    "mechanics.model.Model": "model",
-    "mechanics.calibration.Calibration": "calibration",
+    "mechanics.recording.recording.Recording": "recording",
+    "mechanics.model.model.Model": "model",
+    "mechanics.recording.calibration.Calibration": "calibration",
     "reconstruct.pipeline.Reconstruction": "reconstruction",
     "reconstruct.checks.checkup.Checkup": "check",
     "render.press.Curve": "curve",
@@ -46,7 +46,7 @@ _KINDS: dict[str, str | ModuleType] = {
     "diagnose.compare.comparison.Comparison": "comparison",
     "diagnose.compare.before_after.Changes": "changes",
     "diagnose.verdict.result.Diagnosis": "diagnosis",
-    "diagnose.simulated.result.SimulatedGap": "simulated",
+    "diagnose.other_simulator.result.SimulatedGap": "simulated",
     "diagnose.explore.explored.Explored": "exploration",
     "diagnose.specimen.result.Material": "material",
     "scenes.laboratory.simulate.Simulation": "simulation",
@@ -130,7 +130,7 @@ class _Presenter:
         return ax
 
     def show(self, result: Result, plotter: Plotter | None, screenshot: str | Path | None) -> Plotter | None:
-        from mechanics.files import PNG, atomic_file
+        from mechanics.disk.writing import PNG, atomic_file
         from palpate.show.notebook import in_notebook, show_view
         from palpate.show.scenery import new_plotter
 

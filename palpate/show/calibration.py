@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.calibration import Calibration
 from mechanics.quantities import fitting_unit
+from mechanics.recording.calibration import Calibration
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

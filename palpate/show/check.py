@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import readable
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR

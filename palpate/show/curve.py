@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from render.exact import SolvedPlace
+
 
 def lines(result: Curve) -> list[str]:
     """What `print` says, with units."""
@@ -31,6 +33,17 @@ def lines(result: Curve) -> list[str]:
         f"  the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s; "
         f"the object's Young's modulus is {modulus:.4g} kPa",
         *([f"  {words}"] if (words := said(result.error_figures)) else []),
+        *(_solved(result.exact) if result.exact is not None else []),
+    ]
+
+
+def _solved(exact: SolvedPlace) -> list[str]:
+    """Law, solution and bound along the depth."""
+    rows = zip(1e3 * exact.depth_m, exact.law_n, exact.solved_n, exact.error_n, strict=True)
+    return [
+        "  solved here, along the normal; the forces above are by it",
+        "    depth [mm]   law [N]   solved [N]   the law may be off by [N]",
+        *(f"    {d:10.2f}{law:10.3f}{solved:13.3f}{bound:12.3f}" for d, law, solved, bound in rows),
     ]
 
 
@@ -55,6 +68,7 @@ def as_json(result: Curve) -> dict[str, Any]:
         "force_at_depth_n": result.force_at(depth),
         "peak_force_n": result.peak_force_n,
         **result.error_figures,
+        **({} if result.exact is None else {"exact": result.exact.as_json()}),
     }
 
 
@@ -65,6 +79,12 @@ def draw(result: Curve, ax: Axes) -> None:
     ax.plot(depth, result.force[touching] @ result.normal, color="#1d3557", label="along the normal")
     size = np.linalg.norm(result.force[touching], axis=1)
     ax.plot(depth, size, "--", lw=1, color="#e08e1b", label="magnitude")
+    if result.exact is not None:
+        own = result.exact
+        low, high = own.law_n - own.error_n, own.law_n + own.error_n
+        ax.fill_between(own.depth_m * 1e3, low, high, color="#a8bccb", alpha=0.5, label="the law's bound")
+        ax.plot(own.depth_m * 1e3, own.law_n, ":", color="#457b9d", label="by the law")
+        ax.plot(own.depth_m * 1e3, own.solved_n, "o", color="#1d3557", ms=4, label="solved")
     ax.set(xlabel="depth [mm]", ylabel="force on the tool [N]", title=_renderer(result).name)
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)

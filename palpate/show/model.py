@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.model import Model
-from mechanics.model_files import write_model
+from mechanics.model.files import write_model
+from mechanics.model.model import Model
 from palpate.show.model_view import thing_of, usual_colourings
 from palpate.show.object3d import draw_touched
 from palpate.show.page import Page, file_words, subplots

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechanics.model import Model
-from mechanics.presses import Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
 from palpate.show.object3d import AZIMUTH_DEG, level_axes
 from palpate.show.quantities import DEPTH, MODULUS, ORDER, STIFFNESS, UNCERTAINTY
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
-from render.felt_surface import felt_surface
+from render.surface.felt_surface import felt_surface
 
 
 def view_of_presses(

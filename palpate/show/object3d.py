@@ -13,9 +13,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.show.quantities import Quantity
-from render.felt_surface import felt_surface
+from render.surface.felt_surface import felt_surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,7 +76,7 @@ def draw_object(
     elevation_deg: float = ELEVATION_DEG,
     azimuth_deg: float = AZIMUTH_DEG,
 ) -> Axes:
-    """Draw what a tip meets of the object (render.felt_surface) and return `ax`.
+    """Draw what a tip meets of the object (render.surface.felt_surface) and return `ax`.
 
     colours: what the felt surface is coloured by, with a bar beside it. touches: (k, 3) m, points as
     dots, pale where hidden; show_base: the fixed corner nodes as dots.

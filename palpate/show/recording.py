@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from palpate.show.quantities import with_unit
 
 if TYPE_CHECKING:

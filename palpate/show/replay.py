@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from render.exact import ExactReplay
+
 MEASURED, RENDERED = "#a8bccb", "#c1121f"
 
 
@@ -26,7 +28,22 @@ def lines(result: ReplayResult) -> list[str]:
         + (f" (the sensor's noise: {1e3 * result.noise_n:.3g} mN)" if result.noise_n is not None else ""),
         f"  root mean square over {int(result.contact.sum())} samples in contact",
         *([f"  {words}"] if (words := said(result.error_figures)) else []),
+        *(_solved(result.exact) if result.exact is not None else []),
     ]
+
+
+def _solved(exact: ExactReplay) -> list[str]:
+    """Law, solution and bound at the deepest of each place."""
+    found = [
+        f"  solved at {len(exact.places)} places, and the forces are by it",
+        "    at the deepest [mm]   law [N]   solved [N]   the law may be off by [N]",
+    ]
+    for one in exact.places:
+        depth, law, by, bound = 1e3 * one.depth_m[-1], one.law_n[-1], one.solved_n[-1], one.error_n[-1]
+        found.append(f"    {depth:19.2f}{law:10.3f}{by:13.3f}{bound:12.3f}")
+    if exact.unsolved:
+        found.append(f"  {exact.unsolved} places keep the law: no equilibrium was found there")
+    return found
 
 
 def next_steps(result: ReplayResult) -> list[str]:
@@ -47,6 +64,9 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
         "peak_force_n": float(np.linalg.norm(result.force_n, axis=1).max()),
         **result.error_figures,
     }
+    if result.exact is not None:
+        figures["exact"] = {"unsolved_places": result.exact.unsolved,
+                            "places": [one.as_json() for one in result.exact.places]}  # fmt: skip
     return figures if result.noise_n is None else {**figures, "noise_n": result.noise_n}
 
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.errors import OptionError
-from mechanics.model import Model
-from mechanics.tetmesh import vertex_normals
+from mechanics.model.model import Model
+from mechanics.shape.tetmesh import vertex_normals
 from palpate.show.object3d import view_axes
 from render.base import Renderer
-from render.felt_surface import felt_surface
+from render.surface.felt_surface import felt_surface
 
 if TYPE_CHECKING:
     import pyvista

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.progress import Progress, silent
 from palpate.window.inclusion import InclusionMover
 from render.base import Renderer
-from render.felt_surface import with_own_stiffness
 from render.options import RenderOptions
 from render.registry import create
+from render.surface.felt_surface import with_own_stiffness
 
 
 class DrawnRenderers:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.material import Ball
+from mechanics.model.material import Ball
 
 HALF_TIME_S = 60.0
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from diagnose.explore.explorer import Explorer, State, Suggestion
 from diagnose.explore.segments import Segment
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.servo import Servo
 from palpate.window.ghost import Ghost
 from palpate.window.tracing import BaseTracing

@@ -1,7 +1,8 @@
 """A stiff ball that is moved about inside an object: a low-rank change of the compliance, no new precompute.
 
-The change is exact for the model's own mesh (mechanics.inclusion), under the patches of both of the servo's
-tables, and interpolated to the contact surface; a table made from the start has a finer mesh under the skin.
+The change is exact for the model's own mesh (mechanics.elastic.inclusion), under the patches of both of the
+servo's tables, and interpolated to the contact surface; a table made from the start has a finer mesh under
+the skin.
 """
 
 from __future__ import annotations
@@ -14,19 +15,19 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from mechanics import inclusion
+from mechanics.compliance.near_field import contact_width
+from mechanics.compliance.patch import PatchSampler
+from mechanics.disk.scratch import memory_folder, temporary_prefix
 from mechanics.effects.hold import base_hold
-from mechanics.model import Model
-from mechanics.moduli import balls_ratio
-from mechanics.near_field import contact_width
-from mechanics.nearest import closest
-from mechanics.patch import PatchSampler
+from mechanics.elastic import inclusion
+from mechanics.elastic.solver import Solver
+from mechanics.model.model import Model
+from mechanics.model.moduli import balls_ratio
 from mechanics.progress import Progress, silent
-from mechanics.scratch import memory_folder, temporary_prefix
-from mechanics.solver import Solver
+from mechanics.shape.nearest import closest
 from palpate.servo import Servo
 from render.base import Renderer
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from scenes.phantoms import Region
 from scenes.scene import ball_of
 

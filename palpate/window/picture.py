@@ -9,8 +9,8 @@ import pyvista
 import scipy.sparse as sp
 
 from mechanics.frames import tangents
-from mechanics.model import Model
-from mechanics.tetmesh import vertex_normals
+from mechanics.model.model import Model
+from mechanics.shape.tetmesh import vertex_normals
 from palpate.window import shadow
 from palpate.window.board import INK
 from palpate.window.frames import Frame, View

@@ -16,7 +16,7 @@ import pyvista
 from vtkmodules.vtkCommonCore import mutable
 from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
 
-from mechanics.tetmesh import vertex_normals
+from mechanics.shape.tetmesh import vertex_normals
 
 HOVER_M = 0.008
 PRESS_SPEED_M_PER_S = 0.02

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.model import Model
-from mechanics.recording import write_recording
+from mechanics.model.model import Model
+from mechanics.recording.recording import write_recording
 from palpate.servo import Servo
 from palpate.servo.recorder import Recorder
 from palpate.window.tracing import BaseTracing

@@ -19,8 +19,8 @@ import numpy as np
 
 from devices.mapper import Mapping
 from devices.registry import DeviceChoice, spec_of
-from mechanics.compliance import load_or_condense
-from mechanics.model import Model
+from mechanics.compliance.compliance import load_or_condense
+from mechanics.model.model import Model
 from mechanics.progress import Progress, silent
 from palpate.servo import Servo, ServoOptions, ServoReport, ServoSnapshot
 from palpate.servo.started import StartedServo
@@ -33,7 +33,7 @@ from palpate.window.trace import Trace
 from palpate.window.worker import Worker
 from render.base import Renderer
 from render.effects import rendered_touch
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 from render.registry import names
 from render.scene import scene_of
@@ -353,7 +353,7 @@ class TouchSession:
     def _follow_inclusion(self) -> None:
         while not self._inclusion.settled:
             drawing = self._drawn.load("fem", self.worker.tell)
-            assert isinstance(drawing, FemRenderer), "'fem' is made by render.fem"
+            assert isinstance(drawing, FemRenderer), "'fem' is made by render.fem.renderer"
             changed = self._inclusion.follow(self._servo, drawing, self.worker.tell)
             self._drawn.put("fem", changed)
             if self._beside is not None and self._beside.name == "fem":

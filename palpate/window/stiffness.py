@@ -6,7 +6,7 @@ import numpy as np
 
 from palpate.window.worker import Worker
 from render.base import Renderer
-from render.felt_surface import local_stiffness
+from render.surface.felt_surface import local_stiffness
 
 DEPTH_M = 0.003
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.window.frames import level
 
 SECTORS = 72

@@ -17,7 +17,7 @@ import pyvista
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from devices.channel import PoseChannel
-from mechanics.files import PNG, atomic_file
+from mechanics.disk.writing import PNG, atomic_file
 from palpate.window.axes import Axes
 from palpate.window.board import PAPER, Board, Item
 from palpate.window.charts import LiveCharts

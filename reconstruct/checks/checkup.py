@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from mechanics.result import Result
 from reconstruct.checks.finding import Finding
 

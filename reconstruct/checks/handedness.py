@@ -14,7 +14,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from mechanics.press_sites import SITE_M, sites_of
+from mechanics.presses.repeats import SITE_M, sites_of
 from reconstruct.checks.finding import SURE_ODDS, Finding
 from reconstruct.checks.samples import Samples
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from reconstruct.checks.finding import Finding
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.errors import ContactError, NoBaseError, RecordingError
-from mechanics.model_files import read_model
-from mechanics.recording import Recording, base_model_of
+from mechanics.model.files import read_model
+from mechanics.recording.recording import Recording, base_model_of
 from reconstruct.checks.air import air, delay
 from reconstruct.checks.channels import channels
 from reconstruct.checks.clock import clock

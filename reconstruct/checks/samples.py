@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from reconstruct.steps.s1_filter.low_pass import FilterOptions, white_noise_std
 from reconstruct.steps.s1_filter.signals import Filtered, filtered_of
 from reconstruct.steps.s3_contacts.first_touch import ContactSpans, RoughTouches

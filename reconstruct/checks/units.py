@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 from scipy.stats import norm
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from reconstruct.checks.finding import SURE_ODDS, Finding, p_words, sure
 from reconstruct.checks.samples import Samples, Units
 

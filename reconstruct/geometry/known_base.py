@@ -6,7 +6,7 @@ import numpy as np
 
 from mechanics.errors import ContactError
 from mechanics.frames import tangents
-from mechanics.model import Model
+from mechanics.model.model import Model
 from reconstruct.steps.s2_base.outline import Boundary
 
 

@@ -11,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
+from mechanics.disk.surface_files import ClosedSurface, read_surface
 from mechanics.errors import ContactError, SurfaceError
-from mechanics.flat_foot import Standing, standing
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from mechanics.progress import Progress, silent
-from mechanics.recording import Recording
-from mechanics.surface_files import ClosedSurface, read_surface
-from mechanics.tetmesh import vertex_normals
-from mechanics.true_shape import TrueShape
+from mechanics.recording.recording import Recording
+from mechanics.shape.flat_foot import Standing, standing
+from mechanics.shape.tetmesh import vertex_normals
+from mechanics.shape.true_shape import TrueShape
+from reconstruct.geometry.in_device_frame import Placed, foot_rim
 from reconstruct.geometry.known_base import base_of_rim
-from reconstruct.geometry.placed import Placed, foot_rim
 from reconstruct.geometry.registration import (
     SURFACE_SD_M,
     Body,

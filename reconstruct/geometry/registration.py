@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mechanics.robust import EFFICIENT, spread_about_zero, tukey
-from mechanics.tetmesh import vertex_normals
+from mechanics.shape.tetmesh import vertex_normals
 
 DIRECTION_RAD = np.radians(15.0)
 """Standard deviation of a first force's direction about the normal."""

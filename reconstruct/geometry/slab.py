@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.box_mesh import box_mesh
+from mechanics.compliance.sites import SURFACE_EDGE_M
 from mechanics.errors import SurfaceError
 from mechanics.frames import support_axes
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from mechanics.robust import biweight
-from mechanics.sites import SURFACE_EDGE_M
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
+from reconstruct.geometry.in_device_frame import Placed, foot_rim
 from reconstruct.geometry.known_base import base_of_rim
-from reconstruct.geometry.placed import Placed, foot_rim
 from reconstruct.geometry.registration import (
     DIRECTION_RAD,
 )

@@ -8,7 +8,7 @@ from scipy.optimize import nnls
 from scipy.spatial import Delaunay, HalfspaceIntersection, QhullError
 
 from mechanics.errors import SurfaceError
-from mechanics.nearest import distance
+from mechanics.shape.nearest import distance
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import LEAN_M
 from reconstruct.shapes.points import farthest_points

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.nearest import closest
+from mechanics.shape.nearest import closest
 from reconstruct.shapes.kriging import Explained
 
 _EDGE_COSINE = np.cos(np.radians(40))

@@ -14,7 +14,7 @@ import numpy as np
 
 from mechanics.errors import SurfaceError
 from mechanics.frames import support_axes
-from mechanics.press_sites import sites_of
+from mechanics.presses.repeats import sites_of
 
 LEAST_TOUCHES = 4
 """Fewer carry no surface."""

@@ -8,7 +8,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from mechanics.errors import SurfaceError
-from mechanics.nearest import distance
+from mechanics.shape.nearest import distance
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import LEAN_M, Seen
 from reconstruct.shapes.points import farthest_points

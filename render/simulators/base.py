@@ -19,12 +19,12 @@ from scipy.spatial import cKDTree
 from mechanics.effects.friction_slip import EFFECT as SLIP
 from mechanics.errors import OptionError
 from mechanics.key_values import number, pairs, words_of
-from mechanics.model import Model
-from mechanics.refine import refined_around
-from mechanics.tetmesh import TetMesh
+from mechanics.model.model import Model
+from mechanics.shape.refine import refined_around
+from mechanics.shape.tetmesh import TetMesh
 from render.base import Renderer, check_radii
 from render.options import RenderOptions
-from render.snapping import touched_surface
+from render.surface.snapping import touched_surface
 
 NEAR_M, AWAY_M = 0.5e-3, 1e-3
 """Of the tip's surface from the object: where a world begins, and where it ends."""

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.progress import Progress, silent
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.tetmesh import TetMesh
 from render.options import BEST, DOCUMENTED
 from render.simulators.base import SteppedAdapter, SteppedWorld, World, made
 
 if TYPE_CHECKING:
-    from mechanics.model import Model
+    from mechanics.model.model import Model
     from render.base import Renderer
     from render.options import RenderOptions
 

@@ -15,15 +15,15 @@ from scipy.linalg import solve_triangular
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from mechanics import pardiso
+from mechanics.elastic import pardiso
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.tetmesh import TetMesh
 from render.options import BEST, DOCUMENTED
 from render.simulators.base import Adapter, World, made
 
 if TYPE_CHECKING:
-    from mechanics.model import Model
+    from mechanics.model.model import Model
     from render.base import Renderer
     from render.options import RenderOptions
 

@@ -19,7 +19,7 @@ from types import ModuleType
 
 import numpy as np
 
-from mechanics.files import atomic_file, check_room
+from mechanics.disk.writing import atomic_file, check_room
 from mechanics.progress import Progress, silent
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.mesh import coarse_mesh, laboratory_cache

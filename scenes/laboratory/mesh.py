@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from mechanics.disk.scratch import cache_folder
+from mechanics.disk.writing import atomic_file, temporary_folder
 from mechanics.errors import MeshError
-from mechanics.files import atomic_file, cache_folder, temporary_folder
 from scenes.laboratory.refine import boundary_faces, refine
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom

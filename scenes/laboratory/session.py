@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from mechanics.options import option
-from mechanics.recording import Recording
-from mechanics.segments import Segment
+from mechanics.recording.recording import Recording
+from mechanics.recording.segments import Segment
 from scenes.laboratory.curves import Solving
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.effects.solid import scaled

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import OptionError
-from mechanics.recording import Recording, read_recording, write_recording
+from mechanics.recording.recording import Recording, read_recording, write_recording
 from mechanics.result import Result
 from scenes.laboratory.curves import EVERY_CORE, Solving
 from scenes.laboratory.effects import REGISTRY, Bench, Readings, effect

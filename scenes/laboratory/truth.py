@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.gap_bins import gap_by_bin
-from mechanics.presses import HOLDING, LOADING, OUTSIDE, UNLOADING
+from mechanics.presses.gap_bins import gap_by_bin
+from mechanics.presses.table import HOLDING, LOADING, OUTSIDE, UNLOADING
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.force import elastic_force
 from scenes.laboratory.motion import Motion
@@ -91,8 +91,8 @@ def _answered(session: Session, rest: Sequence[str], whole: Readings, *, regions
 def _where(
     session: Session, present: Sequence[str], clean: np.ndarray, whole: Readings, way: Motion
 ) -> dict[str, Any]:
-    """N rms of the gap in bins (mechanics.gap_bins) and, beside `press_n`, when each touch was: `press_s`,
-    (first, last) s of the laboratory's clock.
+    """N rms of the gap in bins (mechanics.presses.gap_bins) and, beside `press_n`, when each touch was:
+    `press_s`, (first, last) s of the laboratory's clock.
 
     The gap: what was read less what the ideal object would answer, that force's best factor (another modulus)
     taken off. What is read in free air too is in both, as it acts on every sample.

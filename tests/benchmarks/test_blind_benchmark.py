@@ -11,7 +11,7 @@ from benchmarks._diagnosis_blind import tasks_of, unfinished
 from benchmarks._diagnosis_cases import ALIKE, FINITE, HIDDEN, SEEDS, WEIGHT, Case, cases
 from benchmarks._diagnosis_scores import answer_of, discovered, summarise
 from mechanics.errors import OptionError
-from palpate.tasks.graph import Graph
+from palpate.parallel.graph import Graph
 
 KNOWN = {"quick": 8, "medium": 250, "full": 640}
 

@@ -17,7 +17,7 @@ from benchmarks.varied.recorded import frame, hand, record, touches
 from benchmarks.varied.shapes import CONCAVE, FAMILIES, SLENDER, shape
 from benchmarks.varied.writing import write
 from benchmarks.variety import REMEDIES
-from mechanics.recording import read_recording
+from mechanics.recording.recording import read_recording
 from scenes.laboratory.effects import Readings
 from scenes.laboratory.frame import axes_of
 

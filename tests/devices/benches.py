@@ -22,8 +22,8 @@ from devices.openhaptics import OpenHapticsOptions
 from devices.openhaptics import make as make_openhaptics
 from devices.pid_ffb import PidOptions
 from devices.pid_ffb import make as make_pid
-from devices.simulated import SimulatedHand
 from devices.spacemouse import make as make_spacemouse
+from devices.virtual_hand import SimulatedHand
 
 from ..support.waiting import eventually
 from .fake_hid import OTHER_IDS, FakeHid, SpaceMouseUnit, StickUnit

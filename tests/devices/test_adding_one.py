@@ -9,10 +9,10 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from devices import simulated
+from devices import virtual_hand as simulated
 from devices.base import Availability
 from devices.registry import DEVICES, DeviceChoice, find_devices, options_of, spec_of
-from devices.simulated import SimulatedHand
+from devices.virtual_hand import SimulatedHand
 from mechanics.options import option
 from palpate.cli import main
 

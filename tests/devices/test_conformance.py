@@ -279,5 +279,6 @@ def test_force_is_zeroed_when_the_program_just_ends() -> None:
         """
     )
     folder = str(Path(__file__).parent)
-    done = subprocess.run([sys.executable, "-c", program, folder], capture_output=True, text=True, timeout=60)
+    command = [sys.executable, "-c", program, folder]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S)
     assert done.stdout.split("\n")[0] == "(0.0, 0.0) 0c04", done.stderr

@@ -15,9 +15,9 @@ from devices.intention import FreeExploration, Path, minimum_jerk
 from devices.mouse import WINDOW_SILENT_S, MouseDevice
 from devices.registry import DEVICES, DeviceChoice, find_devices, make_device
 from devices.replay import ReplayDevice, ReplayOptions
-from devices.simulated import SimulatedHand, SimulatedOptions
+from devices.virtual_hand import SimulatedHand, SimulatedOptions
 from mechanics.errors import DeviceError
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 
 STILL = SimulatedOptions(tremor_m=0.0)
 

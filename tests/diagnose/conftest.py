@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.press_cutting import FoundPresses, cut
-from mechanics.presses import Presses
-from mechanics.recording import Recording
-from mechanics.sites import touch_sites
-from mechanics.tetmesh import TetMesh
-from mechanics.touch import touch_force
+from mechanics.compliance.sites import touch_sites
+from mechanics.contact.touch import touch_force
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.presses.cutting import FoundPresses, cut
+from mechanics.presses.table import Presses
+from mechanics.recording.recording import Recording
+from mechanics.shape.tetmesh import TetMesh
 
 MODULUS, NU, RADIUS, NOISE = 20e3, 0.49, 0.005, 0.01
 
@@ -56,8 +56,11 @@ class Bench:
         self.normals = np.array([[0, 0, 1.0]] * len(top) + [[1.0, 0, 0]] * len(side))
         self.sites = touch_sites(self.mesh, self.points, self.normals, NU)
 
-    def record(self, alter=None, *, law: str = "neo-hookean", seed: int = 0) -> tuple[Recording, Model]:
-        """(recording, model). alter(t, position, force) -> (position, force) acts before the noise."""
+    def record(
+        self, alter=None, *, law: str = "neo-hookean", seed: int = 0, tremor_m: float = 0.0
+    ) -> tuple[Recording, Model]:
+        """(recording, model). alter(t, position, force) -> (position, force) acts before the noise. tremor_m:
+        rms along each axis, of 9 Hz."""
         rng = np.random.default_rng(seed)
         clock = 0.0
         rate = 500.0
@@ -80,6 +83,9 @@ class Bench:
             drag = 0.0008 * np.clip(into / depth, 0, 1) * (1 if number % 2 else -1)
             across = np.array([0.0, 1.0, 0.0])
             d = -into[:, None] * n + drag[:, None] * across
+            if tremor_m > 0:
+                phase = 2 * np.pi * (9 * local[:, None] + rng.uniform(size=3))
+                d = d + np.sqrt(2) * tremor_m * np.sin(phase)
             f = touch_force(
                 d,
                 n,

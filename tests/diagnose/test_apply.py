@@ -8,16 +8,16 @@ from functools import partial
 import numpy as np
 import pytest
 
-import mechanics.surface_compliance as made
+import mechanics.compliance.surface_compliance as made
 from diagnose.apply import improved, with_effects, with_replayed_modulus
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
+from mechanics.compliance.near_field import surface_softness
+from mechanics.compliance.sites import touch_solver
 from mechanics.effects.registry import effect
-from mechanics.material import Ball
-from mechanics.model_files import read_model, write_model
-from mechanics.near_field import surface_softness
-from mechanics.sites import touch_solver
-from render.fem import FemRenderer
+from mechanics.model.files import read_model, write_model
+from mechanics.model.material import Ball
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 
 UP = np.array([0.0, 0.0, 1.0])

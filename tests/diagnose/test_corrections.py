@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from diagnose.apply import corrected, unsure
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 
 
 def verdict(**intervals):

@@ -12,7 +12,7 @@ from diagnose.search.detectable import SEEN, detectable
 from diagnose.search.evidence import Search
 from diagnose.search.fit import settings_of
 from mechanics.effects.registry import effect
-from mechanics.model import Model
+from mechanics.model.model import Model
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from diagnose.pipeline import diagnose
-from mechanics.recording import read_recording
+from mechanics.recording.recording import read_recording
 
 EXPECTED = {
     "silicone-1-cylinder": "finite_strain",

@@ -13,18 +13,18 @@ from functools import partial
 import numpy as np
 import pytest
 
-import mechanics.surface_compliance as made
+import mechanics.compliance.surface_compliance as made
 from diagnose.apply import with_effects
 from diagnose.forward.prediction import Forward
-from mechanics.compliance import load_or_condense
+from mechanics.compliance.compliance import load_or_condense
+from mechanics.compliance.far_field import energy_fields, far_with_weights
+from mechanics.compliance.near_field import surface_softness
+from mechanics.compliance.pressed_places import solve_places
+from mechanics.compliance.sites import touch_solver
 from mechanics.effects.registry import effect, effects
-from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.frames import tangents
-from mechanics.near_field import surface_softness
-from mechanics.press_making import of_paths
-from mechanics.pressed_places import solve_places
-from mechanics.sites import touch_solver
-from render.fem import FemRenderer
+from mechanics.presses.making import of_paths
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 
 COARSE_M = 0.05

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.press_making import of_paths
-from mechanics.presses import HOLDING, LOADING, UNLOADING
+from mechanics.presses.making import of_paths
+from mechanics.presses.table import HOLDING, LOADING, UNLOADING
 
 
 def test_a_press_has_a_deepest_part_even_where_it_never_reaches_the_surface():

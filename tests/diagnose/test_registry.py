@@ -13,7 +13,7 @@ import pytest
 from diagnose.apply import improved
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
-from mechanics.dent import dent_law, grid
+from mechanics.contact.dent import dent_law, grid
 from mechanics.effects import registry
 from palpate.show.diagnosis.words import meaning
 from render.effects import rendered_touch
@@ -33,7 +33,7 @@ TOY = '''
 
 import numpy as np
 
-from mechanics.dent import grid
+from mechanics.contact.dent import grid
 from mechanics.effects.base import Effect, Parameter, Scope, unchanged
 
 

@@ -19,7 +19,7 @@ from diagnose.pipeline import diagnose
 from diagnose.search.evidence import Search
 from diagnose.verdict.next_touch import next_touch
 from mechanics.effects.registry import effect
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 
 UP = np.array([0.15, -0.1, 0.98]) / np.linalg.norm([0.15, -0.1, 0.98])
 CENTRE = np.array([0.3, -0.2, 0.1])

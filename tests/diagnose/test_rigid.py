@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,20 +10,28 @@ import pytest
 
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
-from diagnose.instrument.offsets import find_instrument_offsets, read_sideways
+from diagnose.instrument.offsets import find_instrument_offsets, read_sideways, ruled_out, seen_play
 from diagnose.instrument.rigid import Rigid, rigid_of
 from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.attribution import attribute
 from diagnose.search.evidence import Search
 from mechanics.effects.registry import effect
 from mechanics.frames import tangents
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 
 NORMAL = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
 
 
+def followed(tip: np.ndarray, width: float) -> np.ndarray:
+    """What a reading shows that is dragged once the tip is half the play ahead, axis by axis."""
+    read = tip.copy()
+    for i in range(1, len(tip)):
+        read[i] = np.clip(read[i - 1], tip[i] - width / 2, tip[i] + width / 2)
+    return read
+
+
 def traced(
-    compliance: float, *, lift: bool = False, gain: np.ndarray | None = None
+    compliance: float, *, lift: bool = False, gain: np.ndarray | None = None, play: float = 0.0
 ) -> tuple[Recording, SimpleNamespace]:
     """A tip that is led around on a leaning plane, pressed with 1 to 3 N, read through a spring; friction
     drags at it, and what it is led around pushes it outwards."""
@@ -39,7 +48,10 @@ def traced(
         up = np.clip(np.sin(1.3 * t) - 0.8, 0, None)
         tip = tip + 0.02 * up[:, None] * NORMAL
         force = np.where(up[:, None] > 0, 0.0, force)
-    read = np.round((tip - compliance * force) / 3e-5) * 3e-5
+    read = tip - compliance * force
+    if play:
+        read = followed(read, play)
+    read = np.round(read / 3e-5) * 3e-5
     seen = force if gain is None else force @ gain.T
     recording = Recording(
         t=t, position=read, force_on_tool=seen + rng.normal(0, 0.012, force.shape), sample_rate_hz=1e3,
@@ -68,6 +80,40 @@ def test_a_support_that_leans_otherwise_than_the_model_says_is_no_gain():
 def test_a_stiff_tool_reads_none():
     found = rigid_of(*traced(0.0), NORMAL)
     assert abs(found.compliance) < 4 * found.error + 2e-7
+
+
+@pytest.mark.parametrize("compliance", [0.0, 1e-3])
+def test_a_play_is_read_off_the_support_beside_a_spring(compliance):
+    found = rigid_of(*traced(compliance, play=0.3e-3), NORMAL)
+    assert found.play == pytest.approx(-0.3e-3, rel=0.05) and found.play < -20 * found.play_error
+    assert abs(found.compliance - compliance) < 2e-5
+
+
+def test_a_spring_alone_is_no_play():
+    found = rigid_of(*traced(1e-3), NORMAL)
+    assert abs(found.play) < 0.01e-3
+
+
+def test_a_support_along_the_axes_tells_of_no_play():
+    recording, table = traced(0.0)
+    flat = np.column_stack([recording.position[:, :2], np.zeros(len(recording.t))])
+    flat = dataclasses.replace(recording, position=flat)
+    assert not np.isfinite(rigid_of(flat, table, np.array([0.0, 0.0, 1.0])).play_error)
+
+
+def test_what_the_support_shows_of_a_play_settles_it(bench):
+    recording, model = bench.record()
+    forward = build_forward(touches_of(bench.table(recording)), model)
+    wide = Rigid(0.0, 1e-6, 1e-6, 10.0, play=-0.3e-3, play_error=1e-6)
+    none = Rigid(0.0, 1e-6, 1e-6, 10.0, play=1e-6, play_error=1e-6)
+    known = seen_play(wide, set())
+    assert known.parameters[0].low < -0.3e-3 < known.parameters[0].high < -0.28e-3
+    assert "backlash" not in ruled_out(forward, wide, None)
+    assert seen_play(none, set()) is None and "backlash" in ruled_out(forward, none, None)
+    assert seen_play(wide, {"backlash"}) is None
+    # a play that presses hardly feel is there all the same
+    narrow = Rigid(0.0, 1e-6, 1e-6, 10.0, play=-0.06e-3, play_error=1e-6)
+    assert seen_play(narrow, set()) and "backlash" not in ruled_out(forward, narrow, None)
 
 
 def test_no_contact_with_the_support_tells_nothing():

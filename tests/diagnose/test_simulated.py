@@ -10,23 +10,23 @@ import pytest
 from diagnose.numerics.base import Signal, signal_of
 from diagnose.numerics.registry import NAMES, numericals
 from diagnose.options import DiagnoseOptions
+from diagnose.other_simulator.advice import parameter_words
+from diagnose.other_simulator.against_law import seen_in_samples
+from diagnose.other_simulator.forces import Forces, ForcesOptions, aligned, read_forces, sorted_forces
+from diagnose.other_simulator.parts import Parameter
+from diagnose.other_simulator.pipeline import Asked, diagnose_simulated
+from diagnose.other_simulator.presses_to_run import spread_out
+from diagnose.other_simulator.result import PARTS, Mended
+from diagnose.other_simulator.stated import StatedForward, stated_of
 from diagnose.pipeline import diagnose
-from diagnose.simulated.advice import parameter_words
-from diagnose.simulated.against_law import seen_in_samples
-from diagnose.simulated.chosen import spread_out
-from diagnose.simulated.forces import Forces, ForcesOptions, aligned, read_forces, sorted_forces
-from diagnose.simulated.parts import Parameter
-from diagnose.simulated.pipeline import Asked, diagnose_simulated
-from diagnose.simulated.result import PARTS, Mended
-from diagnose.simulated.stated import StatedForward, stated_of
-from mechanics.box_mesh import box_mesh
 from mechanics.effects.registry import NAMES as PHYSICAL
 from mechanics.errors import OptionError, RecordingError
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.presses import LEAD_S
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.presses.table import LEAD_S
 from mechanics.progress import silent
-from palpate.show.simulated import lead
+from mechanics.shape.box_mesh import box_mesh
+from palpate.show.other_simulator import lead
 from render.registry import create
 from render.replay import replay
 

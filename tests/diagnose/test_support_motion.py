@@ -9,14 +9,20 @@ import pytest
 
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
-from mechanics import support_motion as support
-from mechanics.far_field import energy_fields
+from mechanics.compliance import support_motion as support
+from mechanics.compliance.far_field import energy_fields
+from mechanics.compliance.patch import PatchSampler
+from mechanics.compliance.support_motion import (
+    far_on_springs,
+    far_partly_bonded,
+    few_corners,
+    loosened,
+    support_motion,
+)
+from mechanics.elastic.solver import Solver
+from mechanics.elastic.support import BaseHold
 from mechanics.frames import tangents
-from mechanics.patch import PatchSampler
-from mechanics.refine import typical_edge
-from mechanics.solver import Solver
-from mechanics.support import BaseHold
-from mechanics.support_motion import far_on_springs, far_partly_bonded, few_corners, loosened, support_motion
+from mechanics.shape.refine import typical_edge
 
 
 @pytest.fixture(scope="module")

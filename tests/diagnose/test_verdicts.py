@@ -17,10 +17,10 @@ from diagnose.options import DiagnoseOptions, NuisanceOptions
 from diagnose.pipeline import diagnose
 from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.next_touch import next_touch
-from mechanics.gap_bins import gap_by_bin
+from mechanics.presses.gap_bins import gap_by_bin
 from palpate.show.demo import diagnosis_json, diagnosis_words
 from palpate.show.diagnosis.words import spoken, verdict
-from reconstruct.placing import presses_on
+from reconstruct.presses_on_model import presses_on
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
 

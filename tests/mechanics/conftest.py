@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
-from mechanics.box_mesh import box_mesh
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 
 
 @pytest.fixture(scope="session")
 def box() -> Callable[..., TetMesh]:
-    """The factory mechanics.box_mesh.box_mesh(cells, size, grade)."""
+    """The factory mechanics.shape.box_mesh.box_mesh(cells, size, grade)."""
     return box_mesh

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from benchmarks._condensation import condense
-from mechanics.compliance import ComplianceOptions
+from mechanics.compliance.compliance import ComplianceOptions
+from mechanics.compliance.sites import LoadPatch, touch_sites
+from mechanics.compliance.surface_compliance import patch_blocks, surface_compliance
+from mechanics.elastic.pardiso import available
+from mechanics.elastic.solver import Solver
 from mechanics.errors import MeshError, OptionError
-from mechanics.nearest import closest
-from mechanics.pardiso import available
-from mechanics.sites import LoadPatch, touch_sites
-from mechanics.solver import Solver
-from mechanics.surface_compliance import patch_blocks, surface_compliance
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.nearest import closest
+from mechanics.shape.tetmesh import TetMesh
 
 WAYS = [("columns", "superlu", 0)]
 if available():  # schur: all at once for a small result, in two parts for a large one

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compression import between_mixed, compress, mix_factor
+from mechanics.compliance.compression import between_mixed, compress, mix_factor
+from mechanics.compliance.patch import PatchSampler
+from mechanics.elastic.solver import Solver
 from mechanics.errors import MeshError
-from mechanics.patch import PatchSampler
-from mechanics.solver import Solver
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.dent import dent_force, dent_law, dent_laws, effective_radius, grid
+from mechanics.contact.dent import dent_force, dent_law, dent_laws, effective_radius, grid
 from mechanics.errors import OptionError
 
 from .closed_forms import (

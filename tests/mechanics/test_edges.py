@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
-from mechanics.edges import edge_correction
+from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from mechanics.contact.edges import edge_law
+from mechanics.contact.touch import forces_at
 from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.tetmesh import TetMesh
-from mechanics.touch import forces_at
-from mechanics.true_shape import TrueShape
+from mechanics.shape.tetmesh import TetMesh
+from mechanics.shape.true_shape import TrueShape
 
 SIZE_M = (0.08, 0.08, 0.04)
 UP, OUT = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -22,7 +24,7 @@ HALF_SPACE = (1 - 0.49**2) / (2 * np.sqrt(np.pi) * 0.004)
 @pytest.fixture(scope="module")
 def block() -> TetMesh:
     """A block whose shape is known, standing on its fixed base."""
-    from mechanics.box_mesh import box_mesh
+    from mechanics.shape.box_mesh import box_mesh
 
     mesh = box_mesh((8, 8, 4), SIZE_M)
     shell = trimesh.creation.box(SIZE_M)
@@ -41,22 +43,58 @@ def wall(*height_m: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_rim_is_soft_at_its_edge_stiffer_beside_it_and_nothing_further_in(block):
-    at_edge, beside, far = edge_correction(block, *top(0.0, 0.005, 0.03))
-    assert at_edge[2, 2] > 0.1 * HALF_SPACE
-    assert -0.25 * HALF_SPACE < beside[2, 2] < -0.05 * HALF_SPACE
+    law = edge_law(block, *top(0.0, 0.005, 0.03))
+    at_edge, beside, far = law.far
+    assert at_edge[2, 2] > 0.5 * HALF_SPACE
+    assert -0.1 * HALF_SPACE < beside[2, 2] < 0
     assert not far.any()
     assert np.count_nonzero(beside) == 1  # along the normal alone
-
-
-def test_the_base_holds_what_lies_close_above_it(block):
-    near, higher, far = edge_correction(block, *wall(0.006, 0.009, 0.022))[:, 0, 0]
-    assert near < higher < 0
-    assert near < -0.05 * HALF_SPACE
+    at_edge, beside, far = 0.005 * law.bracing
+    assert at_edge > 1 > 0.5 > beside > 0.1
     assert far == 0
 
 
+def test_the_base_holds_what_lies_close_above_it(block):
+    law = edge_law(block, *wall(0.006, 0.009, 0.022))
+    near, higher, far = law.far[:, 0, 0]
+    assert near < higher < 0
+    assert far == 0
+    near, higher, far = 0.005 * law.bracing
+    assert near > 0.2 > higher > 0.05 > 0.02 > far >= 0
+
+
+def test_a_base_close_below_makes_a_dent_harder_the_deeper_it_is(block):
+    points, normals = wall(0.0085, 0.025)
+    sites = touch_sites(block, points, normals, 0.49, curvature=0.0)
+    depths = np.linspace(0, 8e-3, 81)
+    way, starts = np.tile(depths, 2)[:, None] * -OUT, np.array([0, 81, 162])
+    law = {"young_modulus_pa": 1.0, "tip_radius_m": 0.005, "law": "neo-hookean"}
+    with_base = forces_at(sites, way, starts, **law)[:, 0].reshape(2, 81)
+    without = forces_at(replace(sites, bracing=0.0), way, starts, **law)[:, 0].reshape(2, 81)
+    harder = with_base[:, 1:] / without[:, 1:] - 1
+    assert (np.diff(harder[0]) > 0).all()
+    assert harder[0, 9] < 0.02 < 0.03 < harder[0, -1] < 0.12
+    assert np.abs(harder[1]).max() < 5e-3
+
+
+def test_no_closed_path_over_a_braced_place_gives_work(block):
+    points, normals = wall(0.0085)
+    sites = touch_sites(block, points, normals, 0.49, curvature=0.0)
+    turn = np.linspace(0, 2 * np.pi, 401)
+    down = 4e-3 * (1 - np.cos(turn))
+    for aside in (0.0, 2e-3):
+        way = down[:, None] * -OUT + aside * np.sin(2 * turn)[:, None] * np.array([0, 0, 1.0])
+        law = {"young_modulus_pa": 1.0, "tip_radius_m": 0.005, "law": "neo-hookean"}
+        force = forces_at(sites, way, np.array([0, len(way)]), **law)
+        done = float(np.einsum("ki,ki->", 0.5 * (force[1:] + force[:-1]), np.diff(way, axis=0)))
+        pushed = float(np.abs(np.einsum("ki,ki->k", force[1:], np.diff(way, axis=0))).sum())
+        assert done < 2e-3 * pushed
+        if not aside:
+            assert force[200::-1, 0] == pytest.approx(force[200:, 0], rel=1e-4, abs=1e-12)
+
+
 def test_the_correction_is_smooth_from_place_to_place(block):
-    along = edge_correction(block, *top(*np.arange(0, 0.02, 2e-4)))[:, 2, 2]
+    along = edge_law(block, *top(*np.arange(0, 0.02, 2e-4))).far[:, 2, 2]
     assert np.abs(np.diff(along)).max() < 0.12 * np.ptp(along)
     assert np.abs(np.diff(along, 2)).max() < 0.3 * np.abs(np.diff(along)).max()
 
@@ -64,7 +102,7 @@ def test_the_correction_is_smooth_from_place_to_place(block):
 def test_a_corner_has_of_each_of_its_rims(block):
     points, normals = top(0.005)
     corner = points + [0, SIZE_M[1] / 2 - 0.005 - points[0, 1], 0]
-    one, two = (edge_correction(block, at, normals)[0, 2, 2] for at in (points, corner))
+    one, two = (edge_law(block, at, normals).far[0, 2, 2] for at in (points, corner))
     assert 1.5 * one > two > 2.2 * one
 
 
@@ -73,10 +111,10 @@ def test_neither_a_concave_edge_nor_the_outline_of_the_base_is_a_rim(block):
     inside_out = TrueShape(block.shape.vertices, block.shape.triangles[:, ::-1])
     hollow = TetMesh(block.points, block.tetrahedra, block.fixed, block.touchable, inside_out)
     shapeless = TetMesh(block.points, block.tetrahedra, block.fixed, block.touchable)
-    assert not edge_correction(hollow, *top(0.004)).any()
-    assert edge_correction(block, points, normals) == pytest.approx(
-        edge_correction(shapeless, points, normals)
-    )
+    assert not edge_law(hollow, *top(0.004)).far.any()
+    one, other = edge_law(block, points, normals), edge_law(shapeless, points, normals)
+    assert one.far == pytest.approx(other.far)
+    assert one.bracing == pytest.approx(other.bracing)
 
 
 @pytest.mark.slow

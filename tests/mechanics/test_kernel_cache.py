@@ -61,7 +61,7 @@ def test_a_changed_callee_and_a_changed_number_are_seen(copy: Path, tmp_path: Pa
     assert run(code, copy, tmp_path / "cache") == "46.0 0"
 
 
-MODULES = ("mechanics.dent", "render.support", "devices.safety", "diagnose.forward.kernel",
+MODULES = ("mechanics.contact.dent", "render.support", "devices.safety", "diagnose.forward.kernel",
            "scenes.laboratory.laws", "palpate.servo.clock")  # fmt: skip
 
 
@@ -134,6 +134,6 @@ def test_only_sources_of_kernels_and_what_they_import_count(tmp_path: Path) -> N
     assert source_key(tmp_path) == source_key(ROOT)
     (tmp_path / "palpate/cli.py").write_text("# nothing that a kernel knows of")
     assert source_key(tmp_path) == source_key(ROOT)
-    with open(tmp_path / "mechanics/dent.py", "a") as file:
+    with open(tmp_path / "mechanics/contact/dent.py", "a") as file:
         file.write("# changed\n")
     assert source_key(tmp_path) != source_key(ROOT)

@@ -44,7 +44,7 @@ def test_python_calls_nothing_that_is_compiled_for_kernels_alone(trees):
         for node in ast.walk(tree)
         if isinstance(node, ast.FunctionDef) and decorators(node) & ALONE
     }
-    assert ("render.fem_stick_slip", "settle") in alone
+    assert ("render.fem.stick_slip", "settle") in alone
     wrong = []
     for module, tree in trees.items():
         seen = {

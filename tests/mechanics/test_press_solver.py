@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.box_mesh import box_mesh
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from mechanics.errors import OptionError
 from mechanics.press_solver.condensing import SuperLuFactor, partial_factor
 from mechanics.press_solver.even_surface import even_surface
@@ -12,6 +11,7 @@ from mechanics.press_solver.felt_surface import FeltSurface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
 from mechanics.press_solver.press import PressOptions, PressSolver
 from mechanics.press_solver.solid import Solid
+from mechanics.shape.box_mesh import box_mesh
 
 RADIUS_M, HEIGHT_M = 5e-3, 0.3
 TOP, UP = np.array([0.0, 0.0, HEIGHT_M]), np.array([0.0, 0.0, 1.0])

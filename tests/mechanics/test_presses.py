@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from mechanics.errors import ModelError
-from mechanics.press_cutting import FoundAround, FoundPresses, cut, free_segments
-from mechanics.press_files import read_presses, write_csv, write_presses
-from mechanics.press_making import of_places
-from mechanics.press_sites import sites_of
-from mechanics.presses import FITS
-from mechanics.recording import Recording
+from mechanics.presses.cutting import FoundAround, FoundPresses, cut, free_segments
+from mechanics.presses.files import read_presses, write_csv, write_presses
+from mechanics.presses.making import of_places
+from mechanics.presses.repeats import sites_of
+from mechanics.presses.table import FITS
+from mechanics.recording.recording import Recording
 
 UP = np.array([0.0, 0.0, 1.0])
 TIP, RATE, STIFF = 0.005, 1000.0, 300.0

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from mechanics import model_files, recording
+from mechanics.disk.schema import Key
 from mechanics.effects.registry import effects
 from mechanics.errors import OptionError
+from mechanics.model import files as model_files
 from mechanics.quantities import parse_unit, prefixed, quantity_words, read_unit, unit_of_key
-from mechanics.schema import Key
+from mechanics.recording import recording
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("mechanics", "reconstruct", "render", "devices", "scenes", "diagnose", "palpate")

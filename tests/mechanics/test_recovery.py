@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.nearest import closest
-from mechanics.patch import triangle_shapes
-from mechanics.recovery import edge_middles
+from mechanics.compliance.patch import triangle_shapes
+from mechanics.shape.nearest import closest
+from mechanics.shape.recovery import edge_middles
 
 
 def surface(box):

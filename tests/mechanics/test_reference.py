@@ -11,14 +11,10 @@ E, NU = 30e3, 0.45
 
 
 def test_hertz_agrees_with_an_independent_library():
-    hertz = pytest.importorskip("ContactMechanics.ReferenceSolutions.Hertz", reason="the live oracle")
+    """What ContactMechanics 1.8.3 answers for this depth, radius and modulus (`ReferenceSolutions.Hertz`)."""
     depth, radius = 1.2e-3, 5e-3
-    modulus = reference.plane_strain_modulus(E, NU)
-    force = reference.hertz_force(depth, radius, E, NU)
-    a, _ = hertz.radius_and_pressure(force, radius, modulus)
-    assert hertz.normal_load(depth, radius, modulus) == pytest.approx(force, rel=1e-10)
-    assert hertz.penetration(force, radius, modulus) == pytest.approx(depth, rel=1e-10)
-    assert a == pytest.approx(reference.hertz_contact_radius(depth, radius), rel=1e-10)
+    assert reference.hertz_force(depth, radius, E, NU) == pytest.approx(0.1474301036408684, rel=1e-10)
+    assert reference.hertz_contact_radius(depth, radius) == pytest.approx(0.002449489742783178, rel=1e-10)
 
 
 def test_sphere_becomes_hertz_when_shallow_and_softer_when_deep():

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mechanics.compliance.sites import LoadPatch, mean_curvature, patch_width, touch_sites, touch_solver
+from mechanics.compliance.surface_compliance import surface_compliance
+from mechanics.contact.touch import touch_force
+from mechanics.elastic.pardiso import available
+from mechanics.elastic.solver import Solver
 from mechanics.errors import MeshError
-from mechanics.pardiso import available
-from mechanics.refine import refined_around, refined_near_surface, typical_edge
-from mechanics.sites import LoadPatch, mean_curvature, patch_width, touch_sites, touch_solver
-from mechanics.solver import Solver
-from mechanics.surface_compliance import surface_compliance
-from mechanics.touch import touch_force
+from mechanics.shape.refine import refined_around, refined_near_surface, typical_edge
 
 from .closed_forms import hertz_force
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics import solved_fields
-from mechanics.box_mesh import box_mesh
+from mechanics.compliance import solved_fields
+from mechanics.compliance.patch import half_space_compliance
+from mechanics.compliance.pressed_places import Places
+from mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
+from mechanics.compliance.solved_fields import APART, far_in_field, solve_field
 from mechanics.frames import local_frames
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.patch import half_space_compliance
-from mechanics.pressed_places import Places
-from mechanics.sites import LoadPatch, touch_sites, touch_solver
-from mechanics.solved_fields import APART, far_in_field, solve_field
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.box_mesh import box_mesh
 
 UP, NU = np.array([0.0, 0.0, 1.0]), 0.49
 AT_M = (0.018, 0.024, 0.033, 0.042)
@@ -27,7 +27,7 @@ def _places(edge_cells: int) -> Places:
     point = np.array([[x + centre[0], y + centre[1], 0.02] for x in AT_M for y in AT_M])
     normal = np.tile(UP, (len(point), 1))
     nothing = np.zeros((len(point), 3, 3))
-    return Places(model, point, normal, local_frames(normal), nothing, np.zeros(len(point)))
+    return Places(model, point, normal, local_frames(normal), nothing, *np.zeros((2, len(point))))
 
 
 def _field(places: Places, log_sd: float, seed: int) -> np.ndarray:

@@ -8,12 +8,14 @@ import os
 import numpy as np
 import pytest
 
-from mechanics.compliance import load_or_condense
+from mechanics.compliance.compliance import load_or_condense
+from mechanics.disk.store import content_key, load_or_build, read_arrays, write_arrays
 from mechanics.errors import CacheError
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.model_files import read_model, write_model
-from mechanics.store import content_key, load_or_build, read_arrays, write_arrays
+from mechanics.model.files import read_model, write_model
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+
+from ..support.waiting import PATIENCE_S
 
 ARRAYS = {"a": np.arange(12.0).reshape(3, 4), "b": np.arange(5, dtype=np.float32), "c": np.array([7])}
 
@@ -114,9 +116,9 @@ def test_two_processes_at_once_never_read_the_others_half(tmp_path):
     workers = [context.Process(target=_contend, args=(path, v, queue)) for v in (1, 2)]
     for worker in workers:
         worker.start()
-    results = [queue.get(timeout=60) for _ in range(12)]
+    results = [queue.get(timeout=PATIENCE_S) for _ in range(12)]
     for worker in workers:
-        worker.join(timeout=30)
+        worker.join(timeout=PATIENCE_S)
         assert worker.exitcode == 0
     assert all(results)
     assert os.listdir(tmp_path) == ["x.bin"]

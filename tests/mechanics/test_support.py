@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mechanics.compliance.sites import touch_sites
 from mechanics.effects.hold import base_hold
-from mechanics.elasticity import triangle_mass
+from mechanics.elastic.elasticity import triangle_mass
+from mechanics.elastic.solver import Solver
+from mechanics.elastic.support import BaseHold, base_triangles
 from mechanics.errors import OptionError
-from mechanics.sites import touch_sites
-from mechanics.solver import Solver
-from mechanics.support import BaseHold, base_triangles
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
+from mechanics.contact.touch import STATE_SIZE, TouchedPlaces, moduli, touch_force, touch_forces, touch_step
 from mechanics.frames import local_frames, support_axes, tangents
-from mechanics.touch import STATE_SIZE, TouchedPlaces, moduli, touch_force, touch_forces, touch_step
 
 from .closed_forms import bonded_punch_sideways_force, hertz_force
 

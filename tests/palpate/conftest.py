@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from mechanics.model import Model
-from mechanics.model_files import read_model
-from render.felt_surface import with_own_stiffness
+from mechanics.model.files import read_model
+from mechanics.model.model import Model
 from render.registry import create
+from render.surface.felt_surface import with_own_stiffness
 
 from ..support.once import folder_made_once
 from .window.small import block_model

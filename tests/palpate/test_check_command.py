@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from mechanics.recording import write_recording
+from mechanics.recording.recording import write_recording
 from palpate import cli
 
 from ..reconstruct.exploration_of_cylinder import explore_cylinder

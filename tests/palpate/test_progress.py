@@ -11,11 +11,10 @@ import pytest
 from mechanics.progress import Remaining
 from palpate import output
 from palpate.output import progress_bar
-from palpate.tasks.engine import run_with_bar
-from palpate.tasks.graph import Graph
+from palpate.parallel.engine import run_with_bar
+from palpate.parallel.graph import Graph
 
-LONG_S = 30.0
-"""No test waits so long: until then a line must have come."""
+from ..support.waiting import eventually
 
 
 class Terminal(io.StringIO):
@@ -27,10 +26,8 @@ class Terminal(io.StringIO):
 
 def until(said, wanted: str) -> str:
     """What was said, once the words are there."""
-    end = time.monotonic() + LONG_S
-    while wanted not in (text := said()) and time.monotonic() < end:
-        time.sleep(0.01)
-    return text
+    eventually(lambda: wanted in said())
+    return said()
 
 
 @pytest.mark.parametrize(

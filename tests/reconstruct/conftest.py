@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 
 from .exploration_of_cylinder import explore_cylinder
 

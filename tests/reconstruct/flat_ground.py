@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mechanics.recording import Recording
-from mechanics.sites import TouchSites
-from mechanics.touch import forces_at
+from mechanics.compliance.sites import TouchSites
+from mechanics.contact.touch import forces_at
+from mechanics.recording.recording import Recording
 
 MODULUS_PA, TIP_M, NOISE_N = 12e3, 0.004, 0.004
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from mechanics.errors import ContactError, RecordingError
 from mechanics.robust import spread_about_zero
-from reconstruct.external.compression import Compression
-from reconstruct.external.indentation import Indentation
+from reconstruct.machine_curves.compression import Compression
+from reconstruct.machine_curves.indentation import Indentation
 
 
 def small_strain_modulus(test: Compression, *, low: float = 0.0, high: float = 0.05) -> float:
@@ -37,7 +37,7 @@ class ApproachFit:
 
 
 def fit_approach(indentation: Indentation, *, poisson_ratio: float = 0.5, law: str = "hertz") -> ApproachFit:
-    """Modulus of the approach on a half-space, contact point free; law: a dent law of mechanics.dent.
+    """Modulus of the approach on a half-space, contact point free; law: a dent law of mechanics.contact.dent.
 
     For each contact point the modulus is linear least squares; the point is where the residual's derivative
     vanishes. Raises ContactError where the force never rises above its noise.

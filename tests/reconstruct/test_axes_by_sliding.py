@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from reconstruct.checks.handedness import slides_agree
 from reconstruct.checks.registry import checked_samples
 from reconstruct.checks.samples import Samples

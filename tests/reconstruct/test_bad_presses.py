@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.recording import Recording
-from reconstruct.geometry.placed import nowhere
+from mechanics.recording.recording import Recording
+from reconstruct.geometry.in_device_frame import nowhere
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s3_contacts.contacts import ContactOptions

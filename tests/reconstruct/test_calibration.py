@@ -11,12 +11,12 @@ import pytest
 import palpate as pp
 from diagnose.calibrate.on_object import STIFFEST, instrument_of
 from diagnose.calibrate.on_plate import calibrate_on_plate
-from mechanics.calibration import Calibration, read_calibration
 from mechanics.errors import ContactError, OptionError, RecordingError
-from mechanics.recording import read_recording, write_recording
-from mechanics.samples import delayed
+from mechanics.recording.calibration import Calibration, read_calibration
+from mechanics.recording.recording import read_recording, write_recording
+from mechanics.recording.samples import delayed
 from palpate import cli
-from reconstruct.geometry.placed import nowhere
+from reconstruct.geometry.in_device_frame import nowhere
 from reconstruct.steps.s3_contacts.contacts import explore
 from scenes.embedded import embedded_recording
 

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from mechanics.model_files import read_model
-from mechanics.recording import write_recording
+from mechanics.model.files import read_model
+from mechanics.recording.recording import write_recording
 from palpate import cli
 
 from .exploration_of_cylinder import explore_cylinder

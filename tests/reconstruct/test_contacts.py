@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mechanics.errors import ContactError, OptionError
-from mechanics.segments import Segment
+from mechanics.recording.segments import Segment
 from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s1_filter.tool_weight import tool_weight
 from reconstruct.steps.s3_contacts import single_press

@@ -10,14 +10,14 @@ import pytest
 import palpate as pp
 from diagnose.forward.touches import unobservable_effects
 from diagnose.pipeline import with_tip_of
-from mechanics.box_mesh import box_mesh
 from mechanics.errors import ContactError, OptionError
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.presses import CANNOT_TELL
-from mechanics.tetmesh import TetMesh
-from reconstruct.geometry.placed import nowhere
-from reconstruct.placing import presses_on
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.presses.table import CANNOT_TELL
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
+from reconstruct.geometry.in_device_frame import nowhere
+from reconstruct.presses_on_model import presses_on
 from reconstruct.steps.s1_filter.low_pass import low_pass, noise_gain
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s3_contacts.cycles import free_air_seen

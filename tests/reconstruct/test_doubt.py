@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from mechanics.model_files import read_model
-from mechanics.recording import write_recording
+from mechanics.model.files import read_model
+from mechanics.recording.recording import write_recording
 from palpate import cli
+from reconstruct.geometry.in_device_frame import nowhere
 from reconstruct.geometry.known_shape import place
-from reconstruct.geometry.placed import nowhere
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.steps.s3_contacts.contacts import explore
 from reconstruct.steps.s7_modulus.held_out import held_out, told_by_others
@@ -73,7 +73,7 @@ def test_a_modulus_is_weighed_against_a_constant_push(depth_matters):
 
 
 def _half_space(presses):
-    from mechanics.sites import TouchSites
+    from mechanics.compliance.sites import TouchSites
 
     none = np.zeros(len(presses))
     return TouchSites(presses.point, presses.normal, none, np.zeros((len(presses), 3, 3)), 0.005, 0.49)

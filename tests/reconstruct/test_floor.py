@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.one_d_laws import RIVALS
+from mechanics.model.one_d_laws import RIVALS
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.methods import ReconstructOptions
 from reconstruct.pipeline import reconstruct_fully

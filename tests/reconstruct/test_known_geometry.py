@@ -7,15 +7,15 @@ import pytest
 import trimesh
 
 import palpate as pp
+from mechanics.compliance.sites import SURFACE_EDGE_M
 from mechanics.errors import ContactError, OptionError, SurfaceError
-from mechanics.press_sites import sites_of
-from mechanics.refine import refined_near_surface, typical_edge
-from mechanics.sites import SURFACE_EDGE_M
+from mechanics.presses.repeats import sites_of
+from mechanics.shape.refine import refined_near_surface, typical_edge
 from palpate import cli
 from palpate.operations._declare import Call
 from palpate.operations._shared import given_model
+from reconstruct.geometry.in_device_frame import nowhere
 from reconstruct.geometry.known_shape import place
-from reconstruct.geometry.placed import nowhere
 from reconstruct.geometry.slab import flat_mesh
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.shapes.evidence import Evidence

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.recording import read_recording
+from mechanics.recording.recording import read_recording
 from palpate.show.reconstruction.modulus import height_trends
 from reconstruct.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions

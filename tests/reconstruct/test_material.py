@@ -12,11 +12,11 @@ from diagnose.forward.touches import touches_of
 from diagnose.specimen.approach import approach_of
 from diagnose.specimen.bench import Curve, Similarity, bench_of
 from diagnose.specimen.rivals import held_out_rivals
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from mechanics.errors import ContactError, OptionError, RecordingError
 from palpate import cli
-from reconstruct.external.relaxation import held_out_relaxation
-from reconstruct.external.uniaxial import LAWS, Uniaxial, chosen, fit_law, held_out
+from reconstruct.machine_curves.relaxation import held_out_relaxation
+from reconstruct.machine_curves.uniaxial import LAWS, Uniaxial, chosen, fit_law, held_out
 
 
 def compression(folder, stiffening: float, count: int = 3, modulus: float = 60e3) -> list:

@@ -52,7 +52,7 @@ def test_the_mesh_fills_the_surface(surface, meshing):
 
 
 def test_radius_edge_ratio_of_regular_tetrahedra():
-    from mechanics.tetmesh import TetMesh
+    from mechanics.shape.tetmesh import TetMesh
     from reconstruct.steps.s5_mesh.meshing import quality
 
     corner = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)

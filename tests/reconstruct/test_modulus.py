@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.press_making import PathErrors, of_paths
-from mechanics.press_sites import sites_of
-from mechanics.presses import Presses
-from mechanics.sites import LoadPatch, TouchSites, touch_sites
-from mechanics.solver import Solver
-from mechanics.tetmesh import TetMesh
-from mechanics.touch import forces_at
+from mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites
+from mechanics.contact.touch import forces_at
+from mechanics.elastic.solver import Solver
+from mechanics.presses.making import PathErrors, of_paths
+from mechanics.presses.repeats import sites_of
+from mechanics.presses.table import Presses
+from mechanics.shape.tetmesh import TetMesh
 from reconstruct.steps.s7_modulus.modulus import ModulusOptions, between_sites, combine, fit_modulus
 from reconstruct.steps.s7_modulus.press_fit import fit_law, press_data
 from reconstruct.steps.s7_modulus.shape_error import compliance_covariance

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from mechanics.elastic.solver import Solver
 from mechanics.errors import ContactError
-from mechanics.press_making import of_paths
-from mechanics.presses import Presses
-from mechanics.solver import Solver
+from mechanics.presses.making import of_paths
+from mechanics.presses.table import Presses
 from reconstruct.steps.s7_modulus.modulus_paper import (
     PaperOptions,
     base_reactions,

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from mechanics.errors import ContactError
-from mechanics.recording import Recording
-from mechanics.segments import Segment
+from mechanics.recording.recording import Recording
+from mechanics.recording.segments import Segment
 from reconstruct.checks.support import support
-from reconstruct.geometry.placed import nowhere
+from reconstruct.geometry.in_device_frame import nowhere
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 from reconstruct.steps.s3_contacts.left_out import on_base
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mechanics.press_making import of_paths
-from mechanics.presses import Presses
+from mechanics.presses.making import of_paths
+from mechanics.presses.table import Presses
 from reconstruct.steps.s6_one_d.one_d import fit_paper, fit_robust
 
 RATE = 800.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks._tissue import tissue
-from mechanics.presses import Presses
-from mechanics.sites import touch_sites
+from mechanics.compliance.sites import touch_sites
+from mechanics.presses.table import Presses
 from reconstruct.steps.s7_modulus.modulus import fit_modulus
 from reconstruct.steps.s7_modulus.modulus_field import (
     asked_for,

@@ -8,16 +8,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.recording import Recording
-from mechanics.sites import TouchSites
-from mechanics.tetmesh import TetMesh
-from reconstruct.geometry.placed import nowhere
+from mechanics.compliance.sites import TouchSites
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.recording.recording import Recording
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
+from reconstruct.geometry.in_device_frame import nowhere
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-from reconstruct.placing import presses_on
+from reconstruct.presses_on_model import presses_on
 from reconstruct.steps.s3_contacts.contacts import explore
 from reconstruct.steps.s3_contacts.straightened import slid_in, straightened
 from reconstruct.steps.s7_modulus.modulus import fit_modulus

@@ -153,7 +153,7 @@ def test_uncertainty_covers_the_error_of_a_free_form():
     truth = OWN["blob"]()
     evidence, back = touch(truth, 2)
     found = reconstruct_surface(evidence)
-    from mechanics.nearest import distance
+    from mechanics.shape.nearest import distance
 
     local = back(found.vertices)
     off = local[:, 2] > 0.012
@@ -184,7 +184,7 @@ def test_touches_on_the_support_alone_are_refused():
 
 
 def test_the_labelled_recordings_meet_the_targets(shared_recordings):
-    from mechanics.recording import read_recording
+    from mechanics.recording.recording import read_recording
     from reconstruct.steps.s3_contacts.contacts import explore
     from reconstruct.steps.s4_surface.surface import evidence_of
 

@@ -8,8 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mechanics.one_d_laws import LAWS
-from render.one_d import OneDRenderer
+from mechanics.model.one_d_laws import LAWS
+from render.one_d.renderer import OneDRenderer
 from render.press import Stroke, press
 from render.registry import RENDERERS, create, names
 

@@ -68,7 +68,7 @@ def compiled() -> tuple[list[str], list[list[str]]]:
 def test_a_kernel_is_compiled_once_and_found_by_the_next_process():
     compiled()
     found, kinds = compiled()
-    assert {"render.fem_kernel.fem_step", "render.base._follow", "palpate.servo.loop.compiled_loop"} <= {
+    assert {"render.fem.kernel.fem_step", "render.base._follow", "palpate.servo.loop.compiled_loop"} <= {
         name for name, *_ in kinds
     }
     assert sorted(kinds) == sorted(map(list, {*map(tuple, kinds)}))

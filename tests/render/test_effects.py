@@ -20,7 +20,7 @@ def base():
 
 
 def render_with(base, **effects):
-    from render.fem import FemRenderer
+    from render.fem.renderer import FemRenderer
     from render.options import RenderOptions
 
     made, compliance = base

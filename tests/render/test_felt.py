@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.model import Model
-from mechanics.model_files import read_model, write_model
-from mechanics.press_making import no_presses, of_places
-from mechanics.sites import TouchSites
+from mechanics.compliance.sites import TouchSites
+from mechanics.model.files import read_model, write_model
+from mechanics.model.model import Model
+from mechanics.presses.making import no_presses, of_places
 from palpate.cli import main
-from render.felt_surface import FILE, OWN_DEPTH_M, PRESSES, TOUCHES, felt_surface, with_own_stiffness
 from render.options import RenderOptions
 from render.press import Stroke, press
-from render.snapping import ONSET_NOISE_M, touched_surface
+from render.surface.felt_surface import FILE, OWN_DEPTH_M, PRESSES, TOUCHES, felt_surface, with_own_stiffness
+from render.surface.snapping import ONSET_NOISE_M, touched_surface
 
 from . import shapes
 

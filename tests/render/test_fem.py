@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.sites import touch_sites
-from mechanics.solver import Solver
-from mechanics.touch import touch_force
-from render.fem import FemRenderer
+from mechanics.compliance.sites import touch_sites
+from mechanics.contact.touch import touch_force
+from mechanics.elastic.solver import Solver
+from render.fem.renderer import FemRenderer
 
 TIP = 0.005
 

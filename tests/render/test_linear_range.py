@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.linear_range import linear_range
-from mechanics.sites import touch_sites
-from mechanics.solver import Solver
-from render.fem import FemRenderer
+from mechanics.compliance.sites import touch_sites
+from mechanics.contact.linear_range import linear_range
+from mechanics.elastic.solver import Solver
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 from render.press import Stroke, press
 

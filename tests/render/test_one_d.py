@@ -7,8 +7,8 @@ import pytest
 
 import render
 from mechanics.errors import ModelError, OptionError
-from mechanics.one_d_laws import Law, spread_law
-from mechanics.press_making import no_presses
+from mechanics.model.one_d_laws import Law, spread_law
+from mechanics.presses.making import no_presses
 
 TIP = 0.005
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from mechanics.errors import OptionError, RecordingError
-from mechanics.press_cutting import FoundPresses, cut
-from mechanics.recording import Recording
+from mechanics.presses.cutting import FoundPresses, cut
+from mechanics.recording.recording import Recording
 from palpate.cli import main
 from render.press import Stroke, greatest_difference, press, read_curve, write_curve
 from render.replay import replay, replay_error, replay_touches

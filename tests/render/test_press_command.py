@@ -7,7 +7,7 @@ import json
 import pytest
 
 from mechanics.errors import OptionError
-from mechanics.model_files import write_model
+from mechanics.model.files import write_model
 from palpate.cli import main
 from palpate.testing import press_model  # noqa: F401  (pytest finds the fixture by its name)
 from render.press import read_curve

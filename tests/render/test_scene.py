@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mechanics.errors import OptionError
-from mechanics.model_files import write_model
+from mechanics.model.files import write_model
 from palpate.cli import main
 from render.press import Stroke, press, read_curve
 from render.replay import replay

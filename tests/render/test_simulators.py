@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.box_mesh import box_mesh
 from mechanics.errors import OptionError
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.box_mesh import box_mesh
 from render.options import RenderOptions
 from render.press import Stroke, press
 from render.registry import create, names, simulator_names

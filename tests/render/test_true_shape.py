@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.model_files import read_model, write_model
-from mechanics.nearest import neighbours, sample
-from mechanics.tetmesh import TetMesh
-from mechanics.true_shape import TrueShape
-from render.field import far_field
-from render.surface import contact_surface
+from mechanics.model.files import read_model, write_model
+from mechanics.shape.nearest import neighbours, sample
+from mechanics.shape.tetmesh import TetMesh
+from mechanics.shape.true_shape import TrueShape
+from render.fem.field import far_field
+from render.surface.contact_surface import contact_surface
 
 from . import shapes
 

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.compliance import compliance_file, compliance_key, load_or_condense
+from mechanics.compliance.compliance import compliance_file, compliance_key, load_or_condense
 from mechanics.errors import FileError, PalpateWarning
-from mechanics.model import Model
-from mechanics.model_files import read_model, write_model
+from mechanics.model.files import read_model, write_model
+from mechanics.model.model import Model
 from mechanics.progress import Progress
 from palpate.warm_up import block_renderer
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from scenes import build, shipped
 from scenes.scene import Scene, load_scene
 

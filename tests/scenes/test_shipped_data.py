@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.compliance import compliance_file, compliance_key, load_or_condense
-from mechanics.model import Model
-from mechanics.recording import read_recording
-from mechanics.sites import LoadPatch, touch_sites, touch_solver
+from mechanics.compliance.compliance import compliance_file, compliance_key, load_or_condense
+from mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
+from mechanics.model.model import Model
+from mechanics.recording.recording import read_recording
 from reconstruct.pipeline import reconstruct
-from render.felt_surface import PRESSES, felt_surface, with_own_stiffness
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
+from render.surface.felt_surface import PRESSES, felt_surface, with_own_stiffness
 from scenes import shipped
 from scenes.build import folder_name, model_of
 from scenes.embedded import embedded_recording
@@ -49,8 +49,8 @@ def test_nothing_is_computed_for_a_first_touch(model: Model, monkeypatch: pytest
 
     assert model.path is not None
     assert (model.path / compliance_file(compliance_key(model))).is_file(), MAKE
-    monkeypatch.setattr("mechanics.compliance.surface_compliance", none)
-    monkeypatch.setattr("render.felt_surface.local_stiffness", none)
+    monkeypatch.setattr("mechanics.compliance.compliance.surface_compliance", none)
+    monkeypatch.setattr("render.surface.felt_surface.local_stiffness", none)
     assert felt_surface(model).stiffness_from == PRESSES, MAKE
     with_own_stiffness(FemRenderer(model))
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.timing import table
 from mechanics.errors import ContactError, PalpateError
-from mechanics.recording import Recording, read_recording
+from mechanics.recording.recording import Recording, read_recording
 from reconstruct.checks.finding import Finding
 from reconstruct.checks.registry import REFUSALS, check
 from reconstruct.steps.s3_contacts.contacts import explore

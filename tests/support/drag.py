@@ -148,7 +148,7 @@ def _figure(path: str, renderer: Any, drawn: dict[str, Any], depth_m: float) -> 
     from matplotlib import pyplot as plt
 
     from mechanics.frames import tangents
-    from render.felt_surface import local_stiffness
+    from render.surface.felt_surface import local_stiffness
 
     arrays, up = renderer.contact.arrays, renderer.model.support.normal
     stiffness = local_stiffness(renderer, renderer.model.tool.tip_radius_m, depth_m)

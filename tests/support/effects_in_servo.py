@@ -18,10 +18,10 @@ import numpy as np
 from benchmarks.timing import table
 from devices.registry import DeviceChoice
 from diagnose.apply import with_effects
-from mechanics.compliance import load_or_condense
-from mechanics.model import Model
-from mechanics.model_files import read_model, write_model
-from mechanics.recording import write_recording
+from mechanics.compliance.compliance import load_or_condense
+from mechanics.model.files import read_model, write_model
+from mechanics.model.model import Model
+from mechanics.recording.recording import write_recording
 from palpate.servo.client import Servo
 
 from .effects_felt import Case, cases, felt_on, path_of

@@ -17,13 +17,13 @@ from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector
 from skfem.helpers import ddot, div, sym_grad
 
 from benchmarks.timing import table
-from mechanics.box_mesh import box_mesh
-from mechanics.elasticity import lame_parameters
+from mechanics.compliance.patch import PatchSampler
+from mechanics.elastic.elasticity import lame_parameters
+from mechanics.elastic.pardiso import Pardiso, available
+from mechanics.elastic.solver import Solver
 from mechanics.errors import OptionError
-from mechanics.pardiso import Pardiso, available
-from mechanics.patch import PatchSampler
-from mechanics.solver import Solver
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 
 KINDS = {"linear": (1, False), "quadratic": (2, False), "quadratic, mean dilatation": (2, True)}
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from reconstruct.steps.s3_contacts.contacts import explore
 
 Change = Callable[[Recording, np.random.Generator], Recording]

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.model_files import read_model, write_model
-from mechanics.recording import read_recording, write_recording
+from mechanics.model.files import read_model, write_model
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.recording.recording import read_recording, write_recording
+from mechanics.shape.box_mesh import box_mesh
 from palpate import cli
 from scenes.embedded import embedded_names, embedded_recording
 

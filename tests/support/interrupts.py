@@ -33,10 +33,11 @@ import numpy as np
 import psutil
 
 from benchmarks.timing import table
+from mechanics.disk.scratch import temporary_prefix
 from mechanics.errors import OptionError, PalpateError
-from mechanics.model_files import read_model, write_model
-from mechanics.recording import read_recording, recording_files, write_recording
-from mechanics.scratch import temporary_prefix
+from mechanics.model.files import read_model, write_model
+from mechanics.recording.files import recording_files
+from mechanics.recording.recording import read_recording, write_recording
 from palpate.child import module_command, module_environment
 from scenes.embedded import embedded_names, embedded_recording
 

@@ -3,7 +3,7 @@
 laboratory: straight presses on the cylinder phantom, solved once in linear elasticity and once as a
 neo-Hookean body, far field and all (scenes.laboratory, which shares no code with the renderer). The share by
 which linear is too stiff stands beside the one that the renderer's two dent laws give at the same places,
-which is what mechanics.linear_range stores with a model.
+which is what mechanics.contact.linear_range stores with a model.
 recordings (--models, --recordings): whole paths replayed under both laws, each with the modulus that suits it
 best; error and bias by depth.
 """
@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.model import Model
-from mechanics.model_files import read_model
-from mechanics.recording import Recording, read_recording
-from mechanics.sites import touch_sites
-from mechanics.tetmesh import TetMesh
-from mechanics.touch import forces_at
-from reconstruct.placing import presses_on
-from render.fem import FemRenderer
+from mechanics.compliance.sites import touch_sites
+from mechanics.contact.touch import forces_at
+from mechanics.model.files import read_model
+from mechanics.model.model import Model
+from mechanics.recording.recording import Recording, read_recording
+from mechanics.shape.tetmesh import TetMesh
+from reconstruct.presses_on_model import presses_on
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 from render.replay import replay_recording, rms_n
 from scenes.laboratory.mesh import coarse_mesh

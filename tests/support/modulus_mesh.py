@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.timing import table
 from mechanics.errors import ContactError
-from mechanics.recording import read_recording
+from mechanics.recording.recording import read_recording
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.varied.draws import draw
 from benchmarks.varied.recorded import record
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 from scenes.laboratory.curves import Curve, PathJob
 from scenes.laboratory.specimen import Specimen
 from scenes.phantoms import Phantom

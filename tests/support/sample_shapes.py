@@ -10,7 +10,7 @@ import contextlib
 import numpy as np
 
 from mechanics.errors import MeshError
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.tetmesh import TetMesh
 from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
 
 # sample: rows of (azimuth or x in degrees or mm, height or y in mm, which face)

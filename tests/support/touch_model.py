@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.timing import table
+from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from mechanics.contact.touch import forces_at
+from mechanics.elastic.solver import Solver
 from mechanics.errors import OptionError
-from mechanics.recording import Recording, read_recording
-from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.solver import Solver
-from mechanics.touch import forces_at
+from mechanics.recording.recording import Recording, read_recording
 
 from .sample_shapes import sample_mesh
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.force_error import law_share, place_numbers
 
 UNKNOWN_SHARE = 0.1

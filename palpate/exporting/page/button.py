@@ -6,9 +6,9 @@ import base64
 import gzip
 import html
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.exporting.page.document import file, page_of
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 
 
 def button(model: Model) -> str:

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from devices.codecs import spacemouse
+from mechanics.compliance.surface_compliance import SurfaceCompliance
 from mechanics.errors import ModelError
-from mechanics.model import Model
-from mechanics.presses import Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
 from mechanics.progress import Progress, silent
-from mechanics.surface_compliance import SurfaceCompliance
 from palpate.exporting.page.band import force_band
 from palpate.exporting.page.packed import Block, modes_of
 from palpate.exporting.page.tables import depths_of, greatest_depth, responses, straight_forces
 from render.base import Renderer
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.registry import create
 
 ONE_D = "hunt-crossley"

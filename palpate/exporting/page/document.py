@@ -14,12 +14,12 @@ import numpy as np
 
 from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
-from mechanics.model import Model
+from mechanics.model.model import Model
 from mechanics.progress import Progress, silent
 from palpate.exporting.page.contents import contents, one_d_renderer, press_word
 from palpate.exporting.subject import Subject
 from palpate.show.object3d import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.press import Stroke, press
 from render.scene import TouchScene, in_the_air
 

@@ -1,4 +1,4 @@
-// The surface that is touched: nearest place, ray, walk, first touch. Geometry alone, as in render/walking.py and
+// The surface that is touched: nearest place, ray, walk, first touch. Geometry alone, as in render/surface/walking.py and
 // render/press.py; lengths in metres, device frame. A place is {triangle, weights: [w0, w1, w2]}.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.model_files import read_model
+from mechanics.model.files import read_model
 from palpate.batching.run import Batch
 from palpate.batching.steps import MODEL
 from palpate.show.batch.figures import draw_agreement

@@ -15,7 +15,7 @@ from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
-from render.felt_surface import felt_surface
+from render.surface.felt_surface import felt_surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

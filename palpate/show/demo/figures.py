@@ -15,7 +15,7 @@ from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
 from reconstruct.steps.s6_one_d.one_d import low_passed
-from render.felt_surface import felt_surface
+from render.surface.felt_surface import felt_surface
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

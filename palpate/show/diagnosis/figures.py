@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from diagnose.verdict.result import Diagnosis
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.show.bars import draw_errors, height_of
 from palpate.show.diagnosis.gaps import (
     beside,
@@ -31,7 +31,7 @@ from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR, MODULUS
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
-from render.felt_surface import felt_surface
+from render.surface.felt_surface import felt_surface
 
 MEASURED, IDEAL, IMPROVED, RIVAL = "#1d3557", "#e76f51", "#2a9d8f", "#e9b44c"
 

@@ -11,9 +11,9 @@ from diagnose.verdict.result import Diagnosis
 from mechanics.effects.base import Role
 from mechanics.effects.finite_strain import LAW as FINITE_STRAIN_LAW
 from mechanics.effects.registry import effects
-from mechanics.model import Model
-from mechanics.presses import Presses
-from mechanics.recording import Recording
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
+from mechanics.recording.recording import Recording
 from palpate.show.object3d import spread_over
 
 MOST_EFFECTS = 8

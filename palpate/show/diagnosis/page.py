@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnose.apply import improved
 from diagnose.verdict.result import Diagnosis
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.show.diagnosis.figures import (
     curve_pictures,
     first_picture,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.show.object3d import draw_object, view_axes
 from palpate.show.page import subplots
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR, TOUCH_COLOUR
@@ -15,7 +15,7 @@ from reconstruct.pipeline import Reconstruction
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s6_one_d.one_d import profiles
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
-from render.felt_surface import felt_surface
+from render.surface.felt_surface import felt_surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.stats import pearsonr, spearmanr
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.show.object3d import Colours, draw_object
 from palpate.show.page import subplots
 from palpate.show.quantities import KELVIN_VOIGT, MODULUS, Quantity
 from palpate.show.reconstruction.exploration import spread
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
-from render.felt_surface import felt_surface
+from render.surface.felt_surface import felt_surface
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.model import Model
-from mechanics.touch import forces_at
+from mechanics.contact.touch import forces_at
+from mechanics.model.model import Model
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, draw_touched
 from palpate.show.page import Page, file_words, subplots

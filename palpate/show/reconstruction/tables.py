@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.model import Model
-from mechanics.patch import PatchSampler
-from mechanics.refine import refined_near_surface, typical_edge
-from mechanics.sites import patch_compliance, patch_width
-from mechanics.solver import Solver
+from mechanics.compliance.patch import PatchSampler
+from mechanics.compliance.sites import patch_compliance, patch_width
+from mechanics.elastic.solver import Solver
+from mechanics.model.model import Model
+from mechanics.shape.refine import refined_near_surface, typical_edge
 from palpate.show.diagnosis.words import chance_words
 from palpate.show.page import Page
 from palpate.show.reconstruction.modulus import Trend

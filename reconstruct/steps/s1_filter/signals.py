@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.recording import Recording
-from mechanics.samples import runs
+from mechanics.recording.recording import Recording
+from mechanics.recording.samples import runs
 from reconstruct.shapes.points import in_its_plane
 from reconstruct.steps.s1_filter.fast_drift import (
     crowd_median,

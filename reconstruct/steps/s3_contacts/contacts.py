@@ -13,10 +13,10 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.options import option
-from mechanics.press_cutting import FoundAround, FoundPresses, cut
-from mechanics.press_sites import SITE_M
-from mechanics.presses import Presses
-from mechanics.recording import Recording
+from mechanics.presses.cutting import FoundAround, FoundPresses, cut
+from mechanics.presses.repeats import SITE_M
+from mechanics.presses.table import Presses
+from mechanics.recording.recording import Recording
 from reconstruct.shapes.evidence import LEAST_TOUCHES
 from reconstruct.steps.s1_filter.low_pass import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.steps.s1_filter.signals import Signals, filtered_of

@@ -12,9 +12,9 @@ import dataclasses
 import numpy as np
 
 from mechanics.errors import ContactError
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
+from mechanics.recording.segments import Segment
 from mechanics.robust import spread_about_zero
-from mechanics.segments import Segment
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contact_law import contact_law, fit_offset, fit_rise
 from reconstruct.steps.s3_contacts.contacts import Exploration

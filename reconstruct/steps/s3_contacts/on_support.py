@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechanics.presses import Presses
-from mechanics.recording import Recording
-from mechanics.segments import ON_SUPPORT
+from mechanics.presses.table import Presses
+from mechanics.recording.recording import Recording
+from mechanics.recording.segments import ON_SUPPORT
 from reconstruct.steps.s1_filter.signals import Signals
 from reconstruct.steps.s2_base.outline import Boundary
 

@@ -16,10 +16,10 @@ from scipy.spatial import cKDTree
 from scipy.stats import theilslopes
 
 from mechanics.errors import ContactError
-from mechanics.press_cutting import FoundAround, FoundPresses, cut
-from mechanics.press_sites import sites_of
-from mechanics.presses import Presses
-from mechanics.recording import Recording
+from mechanics.presses.cutting import FoundAround, FoundPresses, cut
+from mechanics.presses.repeats import sites_of
+from mechanics.presses.table import Presses
+from mechanics.recording.recording import Recording
 from mechanics.robust import spread_about_zero
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
 
 _ALONG, _RADII = 0.2, 0.05

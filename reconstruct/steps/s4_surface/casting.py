@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from mechanics.tetmesh import vertex_normals
-from mechanics.true_shape import TrueShape
+from mechanics.shape.tetmesh import vertex_normals
+from mechanics.shape.true_shape import TrueShape
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def cast(
         if measured_normals is not None:
             allowed = np.flatnonzero(facing @ measured_normals[i] > np.cos(np.radians(75)))
             allowed = allowed if len(allowed) else np.arange(len(triangles))
-        # not mechanics.nearest: every contact has triangles of its own to choose among
+        # not mechanics.shape.nearest: every contact has triangles of its own to choose among
         nearest = trimesh.triangles.closest_point(corners[allowed], np.tile(point, (len(allowed), 1)))
         best = int(np.argmin(np.linalg.norm(nearest - point, axis=1)))
         where[i], chosen[i] = nearest[best], allowed[best]

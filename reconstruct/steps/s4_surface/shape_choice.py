@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechanics.errors import SurfaceError
-from mechanics.nearest import distance
 from mechanics.progress import Progress, silent
+from mechanics.shape.nearest import distance
 from reconstruct.shapes.candidates import first_guesses
 from reconstruct.shapes.drawing import draw
 from reconstruct.shapes.evidence import Evidence

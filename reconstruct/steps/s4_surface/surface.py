@@ -14,7 +14,7 @@ from mechanics.errors import SurfaceError
 from mechanics.frames import support_axes
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from mechanics.true_shape import TrueShape
+from mechanics.shape.true_shape import TrueShape
 from reconstruct.shapes.candidates import FITTED, HiddenOutlineError
 from reconstruct.shapes.coarse_drawing import balanced
 from reconstruct.shapes.convex_bounds import gap_to_other_bound, hull_surface, tangent_surface, volume_bounds

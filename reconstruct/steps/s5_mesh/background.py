@@ -5,7 +5,7 @@ from __future__ import annotations
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Self
 
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.tetmesh import TetMesh
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s5_mesh.meshing import Meshing, MeshingOptions, as_meshed, fill
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.tetmesh import EDGES
+from mechanics.shape.tetmesh import EDGES
 
 _TRIALS = 40
 _SWEEPS = 40

@@ -10,10 +10,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from mechanics.errors import MeshError
-from mechanics.nearest import closest, distance, sample
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from mechanics.tetmesh import FACES, TetMesh, lone_faces
+from mechanics.shape.nearest import closest, distance, sample
+from mechanics.shape.tetmesh import FACES, TetMesh, lone_faces
 from reconstruct.shapes.voxels import voxel_surface
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s5_mesh.element_shape import radius_edge_ratio, relaxed

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.presses import FITS, Presses
+from mechanics.presses.table import FITS, Presses
 from reconstruct.steps.s1_filter.low_pass import FilterOptions, low_pass
 
 EXPONENTS = (0.5, 3.0)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechanics.compliance.sites import TouchSites
+from mechanics.contact.touch import forces_at
 from mechanics.errors import ModelError
-from mechanics.one_d_laws import LAWS, RIVALS, Fits, Law, forces_of, spread_law
-from mechanics.presses import Presses
-from mechanics.sites import TouchSites
-from mechanics.touch import forces_at
+from mechanics.model.one_d_laws import LAWS, RIVALS, Fits, Law, forces_of, spread_law
+from mechanics.presses.table import Presses
 from reconstruct.steps.s6_one_d.one_d import columns, fit_robust, low_passed
 from reconstruct.steps.s7_modulus.modulus import ModulusFit, combine
 from reconstruct.steps.s7_modulus.press_fit import touched_as_fitted

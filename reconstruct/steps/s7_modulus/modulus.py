@@ -15,11 +15,11 @@ import numpy as np
 from scipy.stats import t as student
 from scipy.stats import theilslopes
 
+from mechanics.compliance.sites import TouchSites
 from mechanics.errors import OptionError
 from mechanics.options import option
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from mechanics.robust import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
-from mechanics.sites import TouchSites
 from reconstruct.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
 LAWS = ("linear", "neo-hookean", "sphere", "hertz")

@@ -1,10 +1,10 @@
 """A field of Young's modulus from presses: each press's own modulus, and how it answers to the elements'.
 
 Every press is fitted by itself, its first touch a nuisance (`press_fit`); what its modulus says of
-which element follows from the compliance's sensitivities (mechanics.field_response); the likeliest smooth
-field of all presses follows from there (mechanics.smooth_field). The object stays of one modulus where the
-evidence asks for no more: a field must be likelier than places that scatter at random, and predict places
-that were left out.
+which element follows from the compliance's sensitivities (mechanics.compliance.field_response); the likeliest
+smooth field of all presses follows from there (mechanics.compliance.smooth_field). The object stays of one
+modulus where the evidence asks for no more: a field must be likelier than places that scatter at random, and
+predict places that were left out.
 """
 
 from __future__ import annotations
@@ -14,15 +14,10 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.edges import edge_correction
-from mechanics.effects import stiffness_field
-from mechanics.field_response import shares_of, tips_of
-from mechanics.model import Model
-from mechanics.options import option
-from mechanics.pressed_places import Places
-from mechanics.presses import Presses
-from mechanics.sites import TouchSites
-from mechanics.smooth_field import (
+from mechanics.compliance.field_response import shares_of, tips_of
+from mechanics.compliance.pressed_places import Places
+from mechanics.compliance.sites import TouchSites
+from mechanics.compliance.smooth_field import (
     Estimate,
     Shares,
     SmoothField,
@@ -33,8 +28,13 @@ from mechanics.smooth_field import (
     places_of,
     views_of,
 )
-from mechanics.solved_fields import far_in_field
-from mechanics.touch import forces_at
+from mechanics.compliance.solved_fields import far_in_field
+from mechanics.contact.edges import edge_law
+from mechanics.contact.touch import forces_at
+from mechanics.effects import stiffness_field
+from mechanics.model.model import Model
+from mechanics.options import option
+from mechanics.presses.table import Presses
 from reconstruct.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
 LEAST_GAIN = 4.0
@@ -54,8 +54,8 @@ LEVEL_BIAS = 0.02
 (reconstruct.steps.s7_modulus.modulus.ModulusOptions.law_bias)."""
 DENT_DEPTH_SD = 0.25
 """In tip radii: a dent feels a volume, of which no press tells how deep its middle lies; standard deviation
-from the depth at which its modulus is taken (mechanics.smooth_field). Chosen on slabs 1 to 3 of 'palpate
-bench field'."""
+from the depth at which its modulus is taken (mechanics.compliance.smooth_field). Chosen on slabs 1 to 3 of
+'palpate bench field'."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
     """The presses' places on a model of one modulus, where they are solved as touch sites already."""
     frame = presses.frame
     far = np.einsum("pij,pjk,plk->pil", frame, sites.far, frame)
-    return Places(model, presses.point, presses.normal, frame, far, sites.curvature)
+    return Places(model, presses.point, presses.normal, frame, far, sites.curvature, sites.bracing)
 
 
 def press_moduli(
@@ -181,7 +181,7 @@ class FieldSites:
 
 def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> FieldSites:
     """The sites as they are with a field, solved with it in the elements or beside one that was
-    (mechanics.solved_fields); None: of one modulus."""
+    (mechanics.compliance.solved_fields); None: of one modulus."""
     if field is None:
         return FieldSites(sites, np.ones(len(sites)))
     mesh = places.model.mesh
@@ -192,9 +192,8 @@ def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> 
     # a dent of `under` times the modulus in a far field of 1 is that of one modulus in a stiffer far field
     scale = under[:, None, None]
     far = scale * solved[places.place] + (scale - 1) * half[places.place]
-    far += scale * edge_correction(mesh, sites.points, sites.normals)
-    nu = sites.poisson_ratio
-    return FieldSites(TouchSites(sites.points, sites.normals, sites.curvature, far, width, nu), under)
+    far += scale * edge_law(mesh, sites.points, sites.normals).far
+    return FieldSites(replace(sites, far=far, patch_width_m=width), under)
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.elasticity import stiffness
+from mechanics.elastic.elasticity import stiffness
+from mechanics.elastic.solver import Solver
 from mechanics.errors import ContactError, OptionError
 from mechanics.options import option
-from mechanics.presses import Presses
-from mechanics.solver import Solver
-from mechanics.tetmesh import TetMesh
+from mechanics.presses.table import Presses
+from mechanics.shape.tetmesh import TetMesh
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """Each press fitted by the touch law: its modulus in closed form, its first touch as a nuisance.
 
-For a given path the force of the touch law (mechanics.touch) is proportional to the modulus, f = e g(d), with
-d the tip's displacement since first touch and g the law for unit modulus; so e is linear least squares, and
-only the shift u0 of the first touch along the normal is searched (Gauss-Newton, all presses at once).
+For a given path the force of the touch law (mechanics.contact.touch) is proportional to the modulus, f = e
+g(d), with d the tip's displacement since first touch and g the law for unit modulus; so e is linear least
+squares, and only the shift u0 of the first touch along the normal is searched (Gauss-Newton, all presses at
+once).
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechanics.presses import Presses
-from mechanics.sites import TouchSites
-from mechanics.touch import forces_at
+from mechanics.compliance.sites import TouchSites
+from mechanics.contact.touch import forces_at
+from mechanics.presses.table import Presses
 
 _BLOCK_S = 0.004
 _LEAD_S = 0.03
@@ -160,14 +161,8 @@ def far_sensitivity(
     """(k,) m: change of ln e of every press per unit of change of its far-field compliance along the normal,
     1/m; 0 where a press tells no modulus."""
     step = 0.05 * np.abs(np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)) + 0.1
-    changed = TouchSites(
-        sites.points,
-        sites.normals,
-        sites.curvature,
-        sites.far + step[:, None, None] * np.einsum("ka,kb->kab", sites.normals, sites.normals),
-        sites.patch_width_m,
-        sites.poisson_ratio,
-    )
+    along = np.einsum("ka,kb->kab", sites.normals, sites.normals)
+    changed = replace(sites, far=sites.far + step[:, None, None] * along)
     other = fit_law(data, changed, tip_radius_m, fit.law, fit.depth_m, law_error, noise_n, fit)
     known = (other.modulus_pa > 0) & (fit.modulus_pa > 0)
     ratio = np.where(known, other.modulus_pa, 1.0) / np.where(known, fit.modulus_pa, 1.0)

@@ -9,10 +9,10 @@ import pytest
 
 import palpate.show  # noqa: F401  who says and draws results
 from diagnose.compare.before_after import Side, changes
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.press_making import of_places
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.presses.making import of_places
+from mechanics.shape.box_mesh import box_mesh
 from palpate import cli
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -10,8 +10,8 @@ import pytest
 from benchmarks._tissue import tissue
 from diagnose.compare.comparison import Along, CompareOptions, compare_presses
 from diagnose.compare.models import HOMOGENEOUS, RIVALS, as_touched
-from mechanics import solved_fields
-from mechanics.press_making import PathErrors, of_paths
+from mechanics.compliance import solved_fields
+from mechanics.presses.making import PathErrors, of_paths
 from palpate.show.comparison import lines
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field
 

@@ -7,8 +7,8 @@ import pytest
 
 from diagnose.explore.segments import Instrument, Segment, join, split
 from mechanics.errors import RecordingError
-from mechanics.recording import read_recording, write_recording
-from mechanics.segments import Segment as Stretch
+from mechanics.recording.recording import read_recording, write_recording
+from mechanics.recording.segments import Segment as Stretch
 
 
 def _rows(kind, n=400, at=0.0):

@@ -10,7 +10,7 @@ from diagnose.explore.causes import NONE, causes_of
 from diagnose.explore.explorer import Explorer
 from diagnose.explore.goals import GoalOptions
 from diagnose.search.starts import REACH_M
-from mechanics.recording import read_recording
+from mechanics.recording.recording import read_recording
 
 
 @pytest.mark.slow

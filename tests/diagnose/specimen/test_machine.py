@@ -12,7 +12,7 @@ from diagnose.specimen.bench import Curve
 from diagnose.specimen.material import material_of
 from diagnose.specimen.result import MachineTests, Material
 from diagnose.specimen.yielding import machine_of, way_of
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from palpate.show.material import as_json, in_words, lines
 
 RADIUS = 0.005

@@ -12,7 +12,7 @@ from diagnose.specimen.bench import Curve
 from diagnose.specimen.material import material_of
 from diagnose.specimen.result import MachineTests
 from diagnose.specimen.zero import late_contact
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from palpate.show.material import lines
 
 RADIUS, MODULUS = 0.005, 3e4

@@ -74,9 +74,9 @@ def fill(megabytes: int) -> None:
 
 def linger(path: str) -> None:
     """Start a process of its own, say both numbers, and sleep for a minute."""
-    own = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+    own = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
     Path(path).write_text(f"{os.getpid()} {own.pid}")
-    time.sleep(60)
+    time.sleep(600)
 
 
 def replayed(model: str, recording: str) -> str:

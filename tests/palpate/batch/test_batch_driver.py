@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from palpate.tasks import driver
-from palpate.tasks.driver import run
-from palpate.tasks.graph import Graph, Task
-from palpate.tasks.worker import done
+from palpate.parallel import driver
+from palpate.parallel.driver import run
+from palpate.parallel.graph import Graph, Task
+from palpate.parallel.worker import done
 
 GB = 10**9
 
@@ -123,7 +123,7 @@ def test_a_record_that_is_not_whole_or_not_of_this_version_does_not_count(tmp_pa
     elif harm == "gone":
         task.products[0].unlink()
     else:
-        monkeypatch.setattr("palpate.tasks.graph.__version__", "9.9")
+        monkeypatch.setattr("palpate.parallel.graph.__version__", "9.9")
         task = writing(tmp_path, "task")
     assert states(run(Graph([task]), Here(), tmp_path)) == {"task": ("done", False)}
 

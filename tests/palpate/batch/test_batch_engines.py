@@ -19,15 +19,15 @@ import pytest
 from distributed import Client
 
 import palpate as pp
-from mechanics.recording import recording_files
+from mechanics.recording.files import recording_files
 from palpate.child import module_environment
-from palpate.tasks.cluster import DaskExecutor
-from palpate.tasks.driver import run
-from palpate.tasks.graph import Graph, Task
-from palpate.tasks.local import LocalExecutor
+from palpate.parallel.cluster import DaskExecutor
+from palpate.parallel.driver import run
+from palpate.parallel.graph import Graph, Task
+from palpate.parallel.local import LocalExecutor
 from scenes.embedded import embedded_recording
 
-from ...support.waiting import eventually
+from ...support.waiting import PATIENCE_S, eventually
 from .test_batch_local import alive
 
 pytestmark = pytest.mark.slow
@@ -80,8 +80,8 @@ def cluster(tmp_path, monkeypatch) -> Iterator[Cluster]:
     for _ in range(2):
         made.start_worker()
     try:
-        with Client(made.address, timeout=30, set_as_default=False) as client:
-            client.wait_for_workers(2, timeout=60)
+        with Client(made.address, timeout=PATIENCE_S, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=PATIENCE_S)
         yield made
     finally:
         made.close()
@@ -120,7 +120,7 @@ def test_a_killed_worker_and_a_restarted_scheduler_lose_nothing_and_double_nothi
     with DaskExecutor(cluster.address) as executor:
         trouble.start()
         outcomes = run(Graph(tasks), executor, root)
-    trouble.join(10)
+    trouble.join(PATIENCE_S)
     assert harm_done == ["worker", "scheduler"]
     assert len(outcomes) == 80 and all(o.state == "done" for o in outcomes.values())
     values = sorted(o.record.value for o in outcomes.values() if o.task.record.suffix == ".second")
@@ -149,7 +149,7 @@ class NoExecutor:
 
 
 def test_a_scheduler_that_is_not_there_is_told_in_a_line(monkeypatch):
-    monkeypatch.setattr("palpate.tasks.cluster._CONNECT_S", 1.0)
+    monkeypatch.setattr("palpate.parallel.cluster._CONNECT_S", 1.0)
     with pytest.raises(pp.OptionError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         DaskExecutor("tcp://127.0.0.1:9")
 
@@ -196,7 +196,7 @@ def test_an_interruption_ends_what_the_cluster_does_for_this_run_and_for_no_othe
     assert eventually(lambda: not any(map(alive, processes(said[0]))))
     assert all(map(alive, processes(said[1])))
     ended.set()
-    neighbour.join(10)
+    neighbour.join(PATIENCE_S)
     assert eventually(lambda: not any(map(alive, processes(said[1]))))
 
 

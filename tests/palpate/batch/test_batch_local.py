@@ -13,9 +13,9 @@ import psutil
 import pytest
 
 from palpate.child import module_environment
-from palpate.tasks.driver import run
-from palpate.tasks.graph import Graph, Task
-from palpate.tasks.local import LocalExecutor
+from palpate.parallel.driver import run
+from palpate.parallel.graph import Graph, Task
+from palpate.parallel.local import LocalExecutor
 
 from ...support.waiting import PATIENCE_S, eventually
 
@@ -75,9 +75,9 @@ def test_nothing_is_left_running(tmp_path, end):
 import signal
 from pathlib import Path
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
-from palpate.tasks.driver import run
-from palpate.tasks.graph import Graph, Task
-from palpate.tasks.local import LocalExecutor
+from palpate.parallel.driver import run
+from palpate.parallel.graph import Graph, Task
+from palpate.parallel.local import LocalExecutor
 root = Path({str(tmp_path)!r})
 quick = Task("errands:write", {{"value": 1}}, root / "quick", {{"path": str(root / "quick.txt")}})
 slow = Task("errands:linger", {{}}, root / "slow", {{"path": {str(said)!r}}})

@@ -71,7 +71,7 @@ def quick(monkeypatch):
 
     for name in steps.STEPS:
         monkeypatch.setattr(steps, name, step(name))
-    monkeypatch.setattr("palpate.tasks.engine.executor", lambda *given: nullcontext(Here(2)))
+    monkeypatch.setattr("palpate.parallel.engine.executor", lambda *given: nullcontext(Here(2)))
     return did
 
 
@@ -238,7 +238,7 @@ def test_an_interruption_leaves_a_summary_that_says_what_waits(tmp_path, quick, 
 
     collect = Here.collect
     monkeypatch.setattr(Here, "collect", stop_at_b)
-    monkeypatch.setattr("palpate.tasks.engine.executor", lambda *given: nullcontext(Here(1)))
+    monkeypatch.setattr("palpate.parallel.engine.executor", lambda *given: nullcontext(Here(1)))
     assert cli.main(["batch", str(tmp_path / "in"), "-o", str(tmp_path / "out")]) == 130
     rows = list(csv.DictReader((tmp_path / "out" / "summary.csv").open()))
     assert [row["status"] for row in rows] == ["done", "waiting", "waiting"]

@@ -15,11 +15,11 @@ import pytest
 import trimesh
 
 import palpate as pp
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Ball, Material
-from mechanics.model import Model, Support, Tool
-from mechanics.model_files import write_model
-from mechanics.surface_files import read_surface
+from mechanics.disk.surface_files import read_surface
+from mechanics.model.files import write_model
+from mechanics.model.material import Ball, Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.box_mesh import box_mesh
 from palpate import cli
 
 SIZE = (0.06, 0.05, 0.03)

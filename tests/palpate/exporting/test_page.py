@@ -15,13 +15,13 @@ import pytest
 import palpate as pp
 from devices.codecs import spacemouse
 from mechanics.effects.registry import effect
-from mechanics.model import Model
-from mechanics.model_files import read_model, write_model
+from mechanics.model.files import read_model, write_model
+from mechanics.model.model import Model
 from palpate.exporting.page.band import force_band
 from palpate.exporting.page.button import button
 from palpate.exporting.page.contents import shown_modes
 from palpate.exporting.page.packed import modes_of
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.press import Stroke, press, read_curve
 from render.scene import in_the_air
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mechanics.model_files import write_model
+from mechanics.model.files import write_model
 
 from .inputs import DESCRIPTION, block, rows, text_of
 

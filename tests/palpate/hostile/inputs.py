@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Ball, Material, Skin
-from mechanics.model import Model, Support, Tool
+from mechanics.model.material import Ball, Material, Skin
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.box_mesh import box_mesh
 from palpate import cli
 
 HEADER = "t,x,y,z,fx,fy,fz"

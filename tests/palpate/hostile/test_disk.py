@@ -11,8 +11,9 @@ import warnings
 import numpy as np
 import pytest
 
-from mechanics.errors import CacheError, FileError
-from mechanics.files import (
+from mechanics.disk.scratch import sweep, temporary_prefix
+from mechanics.disk.store import read_arrays, write_arrays
+from mechanics.disk.writing import (
     JSON,
     Kind,
     atomic_file,
@@ -21,10 +22,9 @@ from mechanics.files import (
     sole_writer,
     temporary_folder,
 )
-from mechanics.model_files import MODEL, read_model, write_model
-from mechanics.recording import read_recording
-from mechanics.scratch import sweep, temporary_prefix
-from mechanics.store import read_arrays, write_arrays
+from mechanics.errors import CacheError, FileError
+from mechanics.model.files import MODEL, read_model, write_model
+from mechanics.recording.recording import read_recording
 
 from .inputs import block, command, contents, full_disk, one_line
 
@@ -50,7 +50,7 @@ def test_no_bit_of_a_stored_file_changes_unnoticed(tmp_path, step):
 
 
 def test_a_write_that_fails_leaves_what_was_there(folder, record, tmp_path):
-    from mechanics.recording import write_recording
+    from mechanics.recording.recording import write_recording
     from palpate.show.page import Page
     from render.replay import write_forces
 
@@ -100,7 +100,7 @@ def test_room_and_permission_are_seen_before_the_work(tmp_path):
 
 def test_a_full_disk_of_scratch_or_cache_is_seen_before_the_work(monkeypatch, tmp_path):
     full = shutil.disk_usage("/")._replace(free=1000)
-    monkeypatch.setattr("mechanics.files.shutil.disk_usage", lambda _: full)
+    monkeypatch.setattr("mechanics.disk.writing.shutil.disk_usage", lambda _: full)
     with pytest.raises(FileError, match="set PALPATE_CACHE to a folder on another disk"):
         check_room(tmp_path / "deep" / "laboratory", 1 << 20)
     assert not list(tmp_path.iterdir()), "an empty folder is left"
@@ -133,7 +133,7 @@ def test_what_killed_processes_left_is_swept(tmp_path, monkeypatch):
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([f"{temporary_prefix()}alive", "model"])
     assert (tmp_path / "model" / "kept").exists(), "what was being replaced goes back"
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("mechanics.scratch._swept", set())
+    monkeypatch.setattr("mechanics.disk.scratch._swept", set())
     (tmp_path / f"{ours}mesh-x").mkdir()
     command("press", "nothing", "--at", "0,0,0", "--direction", "0,0,-1", "--depth", "0.001")
     assert not list(tmp_path.glob("*mesh-x")), "whatever command is next sweeps the scratch files"

@@ -9,8 +9,8 @@ import pytest
 
 from mechanics.effects.registry import NAMES, effect_keys
 from mechanics.errors import ModelError, PalpateError, SceneError
-from mechanics.material import Ball
-from mechanics.model_files import read_model
+from mechanics.model.files import read_model
+from mechanics.model.material import Ball
 from scenes.scene import load_scene
 
 from .inputs import block, one_line

@@ -15,7 +15,7 @@ from ...support.waiting import PATIENCE_S, eventually
 
 
 def test_a_process_that_follows_its_parent_ends_with_it():
-    code = "import time; from palpate.child import end_with_parent; end_with_parent(); time.sleep(60)"
+    code = "import time; from palpate.child import end_with_parent; end_with_parent(); time.sleep(600)"
     child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
     child.stdin.close()
     assert child.wait(PATIENCE_S) == 1

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mechanics.disk.reading import named_in
 from mechanics.errors import RecordingError, SceneError
-from mechanics.files import named_in
-from mechanics.recording import NotRead, base_model_of, read_recording
+from mechanics.recording.recording import NotRead, base_model_of, read_recording
 
 from .inputs import DESCRIPTION, HEADER, changed, described, one_line, rows, text_of
 

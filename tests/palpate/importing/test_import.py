@@ -318,7 +318,7 @@ def test_impossible_numbers_are_refused(tmp_path, capsys, words):
 @pytest.mark.parametrize("name", ["log.csv.gz", "log.npz"])
 def test_a_small_file_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch, name):
     most = 16 << 20
-    monkeypatch.setattr("mechanics.files._MOST_MEMORY", most)
+    monkeypatch.setattr("mechanics.disk.reading._MOST_MEMORY", most)
     if name.endswith("gz"):
         (tmp_path / name).write_bytes(gzip.compress(bytes(4 * most), 1))
     else:

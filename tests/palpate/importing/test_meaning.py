@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from mechanics.errors import RecordingError
 from palpate import cli
 from palpate.importing.curves import stated_radius

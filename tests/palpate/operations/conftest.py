@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 
 from ...render import shapes
 

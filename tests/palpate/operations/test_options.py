@@ -14,7 +14,7 @@ import pytest
 import palpate as pp
 import render.press
 import render.replay  # noqa: F401
-from diagnose.simulated.forces import ForcesOptions
+from diagnose.other_simulator.forces import ForcesOptions
 from palpate.operations._declare import check_options, declared, operation_of, written
 from palpate.operations._list import OPERATIONS, calls
 from palpate.operations._run import command_operation, parser_of
@@ -50,7 +50,7 @@ def rooms(monkeypatch):
         "reconstruct.pipeline.reconstruct_fully",
         "diagnose.compare.comparison.compare",
         "diagnose.pipeline.diagnose",
-        "diagnose.simulated.pipeline.diagnose_simulated",
+        "diagnose.other_simulator.pipeline.diagnose_simulated",
         "scenes.laboratory.simulate.simulate",
     ):
         monkeypatch.setattr(name, listening)
@@ -62,7 +62,7 @@ def rooms(monkeypatch):
 
     monkeypatch.setattr("palpate.operations.renderer.create", created)
     monkeypatch.setattr("render.scene.scene_of", lambda made, support: listening(*rendered, support))
-    monkeypatch.setattr("reconstruct.placing.presses_on", lambda recording, model: model.presses)
+    monkeypatch.setattr("reconstruct.presses_on_model.presses_on", lambda recording, model: model.presses)
 
 
 def call(name, recording, **options):

@@ -14,9 +14,9 @@ from benchmarks._stability_objects import one as one_on_dome
 from benchmarks.stability import IMPEDANCES, one, plane_stiffness_n_per_m, press_hold_release
 from devices.impedance import HandImpedance
 from devices.safety import CLOCK, JUMP, OVER_SPEED, WORDS
-from devices.simulated import SPEC
+from devices.virtual_hand import SPEC
 from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 from render.passivity import PassivityOptions
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from devices.intention import FreeExploration
-from devices.simulated import SimulatedHand
-from palpate.servo.held_force import HeldForce
+from devices.virtual_hand import SimulatedHand
+from palpate.servo.work_on_hand import HeldForce
 
 PUSH = np.array([0.0, 0.0, 2.0])
 

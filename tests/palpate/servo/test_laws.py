@@ -13,10 +13,10 @@ import pytest
 
 from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
 from devices.impedance import HandImpedance
-from devices.simulated import SPEC
-from mechanics.dent import dent_force, dent_law, grid
+from devices.virtual_hand import SPEC
+from mechanics.contact.dent import dent_force, dent_law, grid
 from mechanics.effects.strain_stiffening import stiffening
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.options import RenderOptions
 from scenes.laboratory.effects import effect
 from scenes.laboratory.motion import Motion

@@ -216,13 +216,13 @@ from benchmarks._elastic_plane import PlaneSource
 servo = Servo(PlaneSource(500.0))
 if sys.argv[1] == "loading":
     servo._listen = lambda: None
-    servo._await = lambda *_: (print(servo.process_id, flush=True), time.sleep(60.0))
+    servo._await = lambda *_: (print(servo.process_id, flush=True), time.sleep(600.0))
 servo.start()
 if os.fork() == 0:
-    time.sleep(60.0)  # it holds the other end of the servo's input
+    time.sleep(600.0)  # it holds the other end of the servo's input
     os._exit(0)
 print(servo.process_id, flush=True)
-time.sleep(60.0)
+time.sleep(600.0)
 """
 
 
@@ -338,7 +338,7 @@ class Breaking:
     """A DeviceChoice of a device that gives a few readings and then fails."""
 
     def make(self):
-        from devices.simulated import SimulatedHand
+        from devices.virtual_hand import SimulatedHand
 
         class Hand(SimulatedHand):
             def read(self):

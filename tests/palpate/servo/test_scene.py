@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from devices.safety import SafetyOptions, safety_parameters
-from devices.simulated import SPEC
+from devices.virtual_hand import SPEC
 from palpate.servo.layout import ENABLE, total_bytes, views
 from palpate.servo.loop import Program, run_tick
 from palpate.servo.tick import (

@@ -10,7 +10,7 @@ from numba import njit
 
 from benchmarks._elastic_plane import ElasticPlane
 from devices.safety import SafetyOptions, reason_words, safety_parameters
-from devices.simulated import SPEC
+from devices.virtual_hand import SPEC
 from palpate.servo import loop as loops
 from palpate.servo.layout import BEAT, DEADLINE, ENABLE, LATE, MISSED, STATUS, STOP, TICKS, total_bytes, views
 from palpate.servo.loop import ServoLoop, make_program, one_tick, run_tick
@@ -300,7 +300,7 @@ def test_the_loop_of_other_platforms_runs_swaps_and_stops(monkeypatch):
         assert servo.shared.counts[TICKS] >= before
     finally:
         servo.shared.control[STOP] = 1
-        assert loop.join(20.0)
+        assert loop.join(PATIENCE_S)
     assert servo.shared.counts[STATUS] == 0
 
 

@@ -16,13 +16,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from ...support.waiting import PATIENCE_S
+
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 _FLAGS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--remote-debugging-port=0",
 )  # fmt: skip
-_PATIENCE_S = 60.0
 _ON_THE_WAY = (
     "navigated or closed",
     "context was destroyed",
@@ -55,7 +56,7 @@ class Tab:
         number = next(self._number)
         self._socket.send(json.dumps({"id": number, "method": method, "params": parameters}))
         while True:
-            answer = json.loads(self._socket.recv(timeout=_PATIENCE_S))
+            answer = json.loads(self._socket.recv(timeout=PATIENCE_S))
             if answer.get("id") == number:
                 if any(words in answer.get("error", {}).get("message", "") for words in _ON_THE_WAY):
                     raise OnTheWay(method)
@@ -99,7 +100,7 @@ class Tab:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def wait(self, expression: str, seconds: float = _PATIENCE_S) -> None:
+    def wait(self, expression: str, seconds: float = PATIENCE_S) -> None:
         """Until an expression is true, on this page or on the one that it gives way to."""
         end = time.monotonic() + seconds
         while True:
@@ -151,10 +152,10 @@ def a_tab(folder: Path) -> Iterator[Tab]:
     )  # fmt: skip
     try:
         port = _port(folder / "DevToolsActivePort", process)
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=_PATIENCE_S) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=PATIENCE_S) as answer:
             address = next(t for t in json.load(answer) if t["type"] == "page")["webSocketDebuggerUrl"]
         # without pings: a busy machine answers them late
-        with connect(address, max_size=None, open_timeout=_PATIENCE_S, ping_interval=None) as socket:
+        with connect(address, max_size=None, open_timeout=PATIENCE_S, ping_interval=None) as socket:
             yield Tab(socket)
     finally:
         os.killpg(process.pid, signal.SIGKILL)
@@ -162,7 +163,7 @@ def a_tab(folder: Path) -> Iterator[Tab]:
 
 
 def _port(file: Path, process: subprocess.Popen[bytes]) -> int:
-    end = time.monotonic() + _PATIENCE_S
+    end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         if file.exists() and (words := file.read_text().split()):
             return int(words[0])

@@ -16,9 +16,9 @@ pytest.importorskip("ipykernel", reason="needs nbclient and ipykernel, which exe
 CELLS = (
     "import numpy as np\n"
     "import palpate as pp\n"
-    "from mechanics.box_mesh import box_mesh\n"
-    "from mechanics.material import Material\n"
-    "from mechanics.model import Model, Support, Tool\n"
+    "from mechanics.shape.box_mesh import box_mesh\n"
+    "from mechanics.model.material import Material\n"
+    "from mechanics.model.model import Model, Support, Tool\n"
     "support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))\n"
     "mesh = box_mesh((4, 4, 2), (0.06, 0.06, 0.03)).quadratic()\n"
     "pp.Model\n"

@@ -114,7 +114,7 @@ def test_every_kind_of_result_is_there_and_shown(kind, module):
 def test_without_palpate_a_result_prints_its_numbers_and_says_what_to_import():
     words = (
         "import sys\n"
-        "from mechanics.calibration import Calibration\n"
+        "from mechanics.recording.calibration import Calibration\n"
         "made = Calibration(tip_radius_m=0.005)\n"
         "print(made)\n"
         "try:\n"

@@ -252,9 +252,9 @@ def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
     import sys
     from types import ModuleType
 
-    from mechanics.box_mesh import box_mesh
-    from mechanics.material import Material
-    from mechanics.model import Model, Support, Tool
+    from mechanics.model.material import Material
+    from mechanics.model.model import Model, Support, Tool
+    from mechanics.shape.box_mesh import box_mesh
 
     class ZMQInteractiveShell:
         pass

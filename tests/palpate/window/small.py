@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.model_files import read_model, write_model
-from mechanics.tetmesh import TetMesh
+from mechanics.model.files import read_model, write_model
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.shape.tetmesh import TetMesh
 from scenes.virtual_presses import palpate_model
 
 SIZE = np.array([0.08, 0.08, 0.04])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.material import Ball
+from mechanics.model.material import Ball
 from palpate.window.game import HALF_TIME_S, Game
 
 NODULE = Ball((0.014, 0.012, 0.030), 0.009, 8.0)

@@ -13,8 +13,8 @@ from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
 from diagnose.explore.goals import GoalOptions
 from diagnose.explore.segments import Instrument
-from mechanics.model import Model
-from mechanics.recording import read_recording
+from mechanics.model.model import Model
+from mechanics.recording.recording import read_recording
 from palpate.window.guide import Guide
 from palpate.window.session import TouchSession
 from palpate.window.window import TouchWindow

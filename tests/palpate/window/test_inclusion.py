@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.model import Model
-from mechanics.moduli import balls_ratio
+from mechanics.model.model import Model
+from mechanics.model.moduli import balls_ratio
 from palpate.window.inclusion import MovingInclusion
 from render.base import Renderer
 from render.registry import create

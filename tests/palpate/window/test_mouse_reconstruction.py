@@ -10,8 +10,8 @@ import pytest
 
 from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
-from mechanics.model import Model
-from mechanics.recording import read_recording
+from mechanics.model.model import Model
+from mechanics.recording.recording import read_recording
 from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.window import TouchWindow
 from reconstruct.pipeline import reconstruct

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.model import Model
+from mechanics.model.model import Model
 from palpate.window.pointer import BEAR_DOWN_M, HOVER_M, LEAN_M, MOST_PRESS_M, MOST_SPEED_M_PER_S, Pointer
 
 R = 0.005

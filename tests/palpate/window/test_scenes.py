@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mechanics.errors import SceneError
-from mechanics.model import Model
-from mechanics.moduli import balls_ratio
+from mechanics.model.model import Model
+from mechanics.model.moduli import balls_ratio
 from scenes.build import keep, model_of
 from scenes.exploration import ExplorationOptions, base_tracing, explore
 from scenes.phantoms import Region

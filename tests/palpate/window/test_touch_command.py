@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.model import Model
-from mechanics.recording import read_recording
+from mechanics.model.model import Model
+from mechanics.recording.recording import read_recording
 from palpate.cli import main
 from palpate.window.tracing import BaseTracing
 

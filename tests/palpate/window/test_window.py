@@ -14,9 +14,9 @@ import pyvista
 from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
 from mechanics.errors import ModelError
-from mechanics.material import Ball
-from mechanics.model import Model
-from mechanics.recording import read_recording
+from mechanics.model.material import Ball
+from mechanics.model.model import Model
+from mechanics.recording.recording import read_recording
 from palpate.operations.touch import Touched
 from palpate.window.axes import ROOM
 from palpate.window.board import BODY
@@ -313,7 +313,7 @@ def test_the_view_keeps_up_with_drags_zooms_and_comes_home(driven: Driven) -> No
 def test_keys_pressed_while_the_worker_is_busy_are_done_after(driven: Driven) -> None:
     gate = threading.Event()
     before = driven.session.young_modulus_pa
-    driven.session.worker.run("waiting", lambda: gate.wait(20.0) and None)
+    driven.session.worker.run("waiting", lambda: gate.wait(PATIENCE_S) and None)
     for _ in range(3):
         driven.window.controls.key("plus")
     gate.set()

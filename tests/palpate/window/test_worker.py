@@ -7,10 +7,12 @@ import threading
 from mechanics.errors import PalpateError
 from palpate.window.worker import Worker
 
+from ...support.waiting import PATIENCE_S
+
 
 def test_requests_wait_their_turn() -> None:
     worker, gate, done = Worker(), threading.Event(), []
-    worker.run("waiting", lambda: done.append(gate.wait(10.0)))
+    worker.run("waiting", lambda: done.append(gate.wait(PATIENCE_S)))
     for k in range(5):
         worker.run(f"{k}", lambda k=k: done.append(k))
     assert not worker.offer("offered", lambda: done.append("offered"))

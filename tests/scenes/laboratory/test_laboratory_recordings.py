@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mechanics.errors import OptionError, RecordingError
-from mechanics.recording import read_recording
+from mechanics.recording.recording import read_recording
 from palpate.cli import main
 from palpate.operations.simulate import effects_from
 from scenes.laboratory.effects import REGISTRY, UNNAMED

@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.integrate import trapezoid
 
-from mechanics.dent import dent_law
+from mechanics.contact.dent import dent_law
 from scenes.laboratory.condensation import Condensation
 from scenes.laboratory.contact import SphereContact
 from scenes.laboratory.effects.contact import relaxed

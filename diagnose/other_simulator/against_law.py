@@ -1,0 +1,222 @@
+"""What a simulator's numerics add: its force against our law's at its own stated parameters, on one path.
+
+The search is the one for physical effects (`diagnose.search`) with the numerical effects in its library. Its
+modulus is stated, not fitted; its noise is not a sensor's but what our own law may miss (`OWN_ERRORS`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from diagnose.numerics.base import NumericalEffect, Signal
+from diagnose.numerics.registry import numericals
+from diagnose.options import AttributionOptions, NuisanceOptions
+from diagnose.other_simulator.stated import StatedForward
+from diagnose.search.attribution import Attribution, attribute
+from diagnose.search.descent import Descent
+from diagnose.search.detectable import SEEN
+from diagnose.search.evidence import Search
+from diagnose.search.fit import Fit, settings_of
+from diagnose.search.intervals import parameter_intervals
+from diagnose.verdict.held_out import ITERATIONS, neighbours, never_worse
+from mechanics.effects.base import Effect, Role
+from mechanics.effects.registry import effects
+from mechanics.presses.table import Noise
+from mechanics.progress import Progress, silent
+
+LEAST_SHARE = 0.02
+"""Of the typical force, below which a numerical effect is not named: our own law is no better everywhere."""
+OWN_ERRORS = NuisanceOptions(
+    onset_m=0.1e-3, site_stiffness=0.03, press_stiffness=0.005, law=0.03, floor_share=0.015, floor_n=1e-3
+)
+"""One standard deviation of what our law misses on the surface that a simulator was given too."""
+COMMON_ERROR = 0.05
+"""Share by which our law may be off everywhere alike: a stiffness within it is no mesh's."""
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """named: strongest first. candidates: not told apart from them.
+
+    By name: keys of every effect that was looked at; intervals at 95 %; probability, gain, confidence_set_p;
+    detectable_n, N rms from which these presses show it at all; values, of its parameters, where it is named;
+    force, the (n, 3) N that it adds to the law's
+    force, of a fit that has not seen the place ("all": of those named together). law: (n, 3) N, our law at
+    the stated parameters; with_numerics: with what was named; local frames. strain: finite strain, where the
+    simulator has it. remainder: something is left that nothing here explains. reasons: in words."""
+
+    named: tuple[str, ...]
+    candidates: tuple[str, ...]
+    keys: dict[str, dict[str, Any]]
+    intervals: dict[str, dict[str, Any]]
+    probability: dict[str, float]
+    force: dict[str, np.ndarray]
+    law: np.ndarray
+    with_numerics: np.ndarray
+    strain: tuple[Effect, ...]
+    remainder: bool
+    reasons: tuple[str, ...]
+    gain: dict[str, float] = field(default_factory=dict)
+    detectable_n: dict[str, float] = field(default_factory=dict)
+    confidence_set_p: dict[str, float] = field(default_factory=dict)
+    values: dict[str, np.ndarray] = field(default_factory=dict)
+    found: Attribution | None = None
+
+
+def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Progress = silent) -> Numerics:
+    """Search the numerical effects in the forces of forward.touches, which are a simulator's."""
+    t = forward.touches
+    typical = t.force_rms_n
+    own = Noise(*(2 * [LEAST_SHARE * typical / np.sqrt(3)]))
+    # nothing smaller than LEAST_SHARE of the force is named: the rule counts in units of the noise
+    forward.touches = dataclasses.replace(t, noise=own)
+    rules = dataclasses.replace(rules, smallest=1.0)
+    strain = next(e for e in effects() if e.role is Role.KNOWN)
+    search = Search(
+        forward, forward.stated.young_modulus_pa, nuisance=OWN_ERRORS, options=rules,
+        site_sd=np.full(len(t), OWN_ERRORS.site_stiffness), finite_strain=strain,
+    )  # fmt: skip
+    tried = [e for e in numericals() if e.see is None]
+    found = attribute(search, tried, progress=progress)
+    ratio_only = _within_common_error(found)
+    names = tuple(n for n in found.chosen if n not in ratio_only)
+    plain = _squares(search, found.base.found)
+
+    def after(kept: tuple[str, ...]) -> np.ndarray:
+        return _squares(search, _with(search, found, kept).found)
+
+    counts = search.whitener.counts()
+    kept = never_worse(names, plain, after, counts, search.whitener.explained)
+    best = _with(search, found, kept.names)
+    law, together = _held_out(search, best.found)
+    force = {"all": together - law}
+    keys, intervals, probability, gain = {}, {}, {}, {}
+    rng = np.random.default_rng(0)
+    for name, score in found.scores.items():
+        fitted = best.found if name in kept.names else score.candidate.found
+        if name in kept.names and len(kept.names) == 1:
+            force[name] = force["all"]
+        else:
+            # an effect alone, on the law: what mending it alone would take away
+            alone, with_it = _held_out(search, score.candidate.found, folds=name in kept.names)
+            force[name] = with_it - alone
+        keys[name] = score.effect.report(fitted.of(name), forward, fitted.modulus)
+        intervals[name] = parameter_intervals(fitted, name, forward, search.dof, rng)
+        probability[name] = (
+            score.probability if name not in kept.names else max(score.probability, rules.sure)
+        )
+        gain[name] = score.gain
+    left = float(best.chi)
+    missed = float(np.sqrt((best.residual[t.counted] ** 2).sum(axis=1).mean()))
+    remainder = left > rules.unknown_chi and missed > LEAST_SHARE * typical
+    reasons = [
+        f"{n.replace('_', ' ')}: within the {COMMON_ERROR:.0%} that our own law may be off everywhere, "
+        "so it is not named" for n in ratio_only
+    ]  # fmt: skip
+    if remainder:
+        reasons.append(
+            f"the simulator's force is {1e3 * missed:.0f} mN from our law even with what is named: something "
+            "else is in its numerics, or it was given other parameters than those stated"
+        )
+    limits = {n: max(x, LEAST_SHARE * typical) for n, x in _limits(search, found, tried).items()}
+    forward.touches = t
+    rivals = tuple(r for r in found.rivals if r not in kept.names)
+    return Numerics(
+        kept.names, rivals if kept.names else (), keys, intervals, probability, force, law, together,
+        law_of(best.found), remainder, tuple(reasons), gain, limits,
+        found.confidence_set_p, {name: best.found.of(name) for name in kept.names}, found,
+    )  # fmt: skip
+
+
+def _limits(search: Search, found: Attribution, tried: Sequence[Effect]) -> dict[str, float]:
+    """{name: N rms over contact samples} of the smallest change by an effect that shows beside what our own
+    law may miss, of the form of its starts that shows best."""
+    forward, base = search.forward, found.base.found
+    before = np.nan_to_num(forward.predict(settings_of(forward, base.effects, base.values, base.onset)))
+    limits = {}
+    for effect in tried:
+        shown = []
+        for start in effect.starts():
+            moved = np.where(start == effect.ideal, start + [10 * p.step for p in effect.parameters], start)
+            settings = settings_of(forward, base.effects, base.values, base.onset)
+            effect.act(settings, moved, forward)
+            change = np.nan_to_num(forward.predict(settings)) - before
+            size = np.sqrt((change[forward.touches.counted] ** 2).sum(axis=1).mean())
+            seen = np.sqrt(search.whitener.gram(change[:, :, None]).sum())
+            shown.append(float(size * SEEN / max(seen, 1e-12)))
+        limits[effect.name] = min(shown)
+    return limits
+
+
+def _within_common_error(found: Attribution) -> tuple[str, ...]:
+    """A mesh's stiffness that is named for what our own law may be off everywhere alike."""
+    name = "mesh_stiffness"
+    if name not in found.chosen:
+        return ()
+    level = found.final.found.of(name)
+    return (name,) if abs(level[0]) < np.log1p(COMMON_ERROR) and abs(level[1]) < COMMON_ERROR else ()
+
+
+def _with(search: Search, found: Attribution, names: tuple[str, ...]) -> Any:
+    if set(names) == set(found.chosen):
+        return found.final
+    base = found.base.found.effects
+    keep = [e for e in found.final.found.effects if e.name in names]
+    return search.judge([*base, *(e for e in keep if e not in base)], like=found.final)
+
+
+def _squares(search: Search, found: Fit) -> np.ndarray:
+    """(g,) N^2 of the places, each of a fit that has not seen it."""
+    t = search.forward.touches
+    out = np.zeros(search.whitener.groups)
+    for fold in neighbours(t):
+        again = _without(search, found, fold)
+        out[fold] = search.whitener.raw_gram(again.residual[:, :, None])[fold, 0, 0]
+    return out
+
+
+def law_of(found: Fit) -> tuple[Effect, ...]:
+    """The effects of a fit that are no flaw: finite strain, where the simulator has it."""
+    return tuple(e for e in found.effects if e.role is Role.KNOWN)
+
+
+def _without(search: Search, found: Fit, fold: np.ndarray) -> Fit:
+    weights = np.ones(search.whitener.groups)
+    weights[fold] = 0.0
+    return Descent(search.forward, search.whitener, found.effects, weights).run(
+        found.values, found.onset, ITERATIONS
+    )
+
+
+def _held_out(search: Search, found: Fit, *, folds: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """((n, 3) N our law alone, (n, 3) N with the effects of a fit): at each place of a fit that has not seen
+    it; folds: else of the one fit."""
+    forward = search.forward
+    t = forward.touches
+    law, together = np.zeros_like(t.local_force), np.zeros_like(t.local_force)
+    base = law_of(found)
+    for fold in neighbours(t) if folds else [np.arange(t.sites)]:
+        again = _without(search, found, fold) if folds else found
+        with_it = forward.predict(settings_of(forward, again.effects, again.values, again.likeliest))
+        plainly = settings_of(forward, base, again.values[:1])
+        rows = np.isin(t.site, fold)[t.press]
+        together[rows] = np.nan_to_num(with_it)[rows]
+        law[rows] = np.nan_to_num(forward.predict(plainly))[rows]
+    return law, together
+
+
+def seen_in_samples(signal: Signal) -> tuple[Signal, dict[str, tuple[NumericalEffect, dict[str, float]]]]:
+    """(the signal without them, {name: (effect, keys)}) of what the samples themselves show."""
+    found = {}
+    for each in numericals():
+        if each.see is not None:
+            seen = each.see(signal)
+            if seen.keys:
+                found[each.name] = (each, seen.keys)
+            signal = seen.signal
+    return signal, found

@@ -1,0 +1,128 @@
+"""A simulation's presses beside the real ones, and what of its force is named against our law."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from diagnose.forward.touches import LEAST_PRESSES, LEAST_ROWS, reached, touches_of
+from diagnose.numerics.base import signal_of
+from diagnose.options import AttributionOptions
+from diagnose.other_simulator.against_law import LEAST_SHARE, Numerics, numerics_of, seen_in_samples
+from diagnose.other_simulator.forces import Aligned
+from diagnose.other_simulator.parts import law_at
+from diagnose.other_simulator.stated import Stated, StatedForward
+from diagnose.verdict.answer import Findings
+from mechanics.compliance.pressed_places import Places
+from mechanics.model.model import Model
+from mechanics.presses.table import MARGIN_S, Presses
+from mechanics.progress import Progress
+
+
+@dataclasses.dataclass
+class Sides:
+    """The simulation's presses beside the real ones. forward: of all its presses, with the mended signal;
+    raw: (n, 3) N, local, the force as it came; rows: of the real touches; fell_s: (p,) s, from when on the
+    tip had fallen through, inf where it did not; seen: what the samples themselves showed."""
+
+    forward: StatedForward
+    raw: np.ndarray
+    rows: np.ndarray
+    fell_s: np.ndarray
+    seen: dict[str, dict[str, float]]
+    notes: tuple[str, ...]
+
+
+def beside(presses: Presses, model: Model, given: Aligned, findings: Findings, stated: Stated) -> Sides:
+    """The forces as touches, row by row beside the real ones."""
+    met = reached(presses) if model.fitted_to(presses) else np.ones(len(presses), dtype=bool)
+    run = np.flatnonzero(given.usable)
+    own = presses.rows(run)
+    signal, seen = seen_in_samples(signal_of(presses.of(run), given.force[own]))
+    force = given.force.copy()
+    force[own] = signal.force
+
+    def touches(force: np.ndarray) -> Presses:
+        nothing = np.zeros_like(force)
+        return touches_of(dataclasses.replace(presses, force=force, free_air=nothing).of(met))
+
+    raw, mended = touches(given.force), touches(force)
+    keep = np.isin(raw.onset_s, presses.onset_s[given.usable])
+    fell_s = np.full(len(presses), np.inf)
+    np.minimum.at(fell_s, presses.press[own][signal.left], signal.t[signal.left])
+    real = findings.forward
+    rows = raw.rows(np.flatnonzero(keep))
+    forward = StatedForward(mended.of(keep), _of(real.places, keep), stated)
+    fell_s = fell_s[np.searchsorted(presses.onset_s, forward.touches.onset_s)]
+    keys = {name: values for name, (_, values) in seen.items()}
+    return Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes)
+
+
+def _of(places: Places, keep: np.ndarray) -> Places:
+    """The places of some presses."""
+    if keep.all():
+        return places
+    own = ("point", "normal", "frame", "far", "curvature", "bracing")
+    cut = {name: getattr(places, name)[keep] for name in own}
+    return dataclasses.replace(places, **cut, stages={})
+
+
+def named_numerics(sides: Sides, rules: AttributionOptions, progress: Progress) -> Numerics:
+    """What is named against the law. Presses that the tip fell through have a say until they did, where that
+    is long enough, and get the law's force with what was named from there on."""
+    forward, t = sides.forward, sides.forward.touches
+    until = np.minimum(t.end_s, sides.fell_s - MARGIN_S)
+    cut = dataclasses.replace(t, end_s=until)
+    seen = np.bincount(t.press[(t.t > t.onset_s[t.press]) & cut.counted], minlength=len(t))
+    held = np.isinf(sides.fell_s) | (seen >= LEAST_ROWS)
+    if held.sum() < LEAST_PRESSES:
+        cut, held = t, np.ones(len(t), bool)
+    sides = dataclasses.replace(sides, fell_s=np.where(held, sides.fell_s, -np.inf))
+    if held.all() and np.isinf(sides.fell_s).all():
+        return _with_seen(sides, numerics_of(forward, rules, progress))
+    of_held = StatedForward(cut.of(held), _of(forward.places, held), forward.stated)
+    return _with_seen(sides, _over_all(sides, numerics_of(of_held, rules, progress), held))
+
+
+def _over_all(sides: Sides, found: Numerics, held: np.ndarray) -> Numerics:
+    """The same over all presses: those that had no say have our law's force."""
+    forward, t = sides.forward, sides.forward.touches
+    rows = t.rows(np.flatnonzero(held))
+    law = law_at(forward, forward.stated, found)
+    together = law.copy()
+    together[rows] = found.with_numerics
+    force = {}
+    for name, own in found.force.items():
+        force[name] = np.zeros_like(law)
+        force[name][rows] = own
+    return dataclasses.replace(found, law=law, with_numerics=together, force=force)
+
+
+def _with_seen(sides: Sides, found: Numerics) -> Numerics:
+    """With what the samples themselves showed, where it matters."""
+    t = sides.forward.touches
+    fell = t.t >= sides.fell_s[t.press]
+    mended = np.where(fell[:, None], found.with_numerics, t.local_force)
+    parts = {
+        "lost_contact": np.where(fell[:, None], 0.0, sides.raw - t.local_force),
+        "tunnelling": np.where(fell[:, None], sides.raw - found.with_numerics, 0.0),
+    }
+    typical = float(np.sqrt((mended[t.counted] ** 2).sum(axis=1).mean()))
+    sizes = {n: float(np.sqrt((f[t.counted] ** 2).sum(axis=1).mean())) for n, f in parts.items()}
+    named = [n for n in sides.seen if sizes[n] > LEAST_SHARE * typical]
+    all_of = found.force["all"] + sum((parts[n] for n in named), np.zeros_like(mended))
+    strength = {n: float((found.force[n][t.counted] ** 2).sum()) for n in found.named}
+    strength |= {n: float((parts[n][t.counted] ** 2).sum()) for n in named}
+    order = tuple(sorted(strength, key=lambda n: -strength[n]))
+    # a tip that is never felt at a place may go between nodes there
+    between = "tunnelling" in named and sides.seen["tunnelling"]["never_felt"] > 0
+    rivals = ("contact_nodes",) if between and "contact_nodes" not in order else ()
+    return dataclasses.replace(
+        found,
+        named=order,
+        candidates=(*found.candidates, *(r for r in rivals if r not in found.candidates)),
+        keys={**found.keys, **sides.seen},
+        probability={**found.probability, **{n: 1.0 if n in named else 0.0 for n in sides.seen}},
+        force={**found.force, **{n: parts[n] for n in sides.seen}, "all": all_of},
+    )

@@ -1,0 +1,205 @@
+"""Another simulator's forces along the recorded path, read and set beside the recording's presses.
+
+Nothing about them is guessed in silence: what is unclear is refused with the option that settles it, what was
+interpolated or left out is said (`Aligned.notes`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.disk.reading import reading
+from mechanics.errors import OptionError, RecordingError
+from mechanics.options import option
+from mechanics.presses.table import LEAD_S, Presses
+
+COLUMNS = ("t", "fx", "fy", "fz")
+LONGEST_GAP_S = 0.03
+"""Without rows in a press, over which nothing is interpolated: the press is left out."""
+AGAINST, LAG_S, BETTER = -0.3, 0.15, 0.1
+"""Cosine from which forces point the wrong way; lag that no delay makes; by how much it must fit better."""
+OTHER_UNIT = 30.0
+_GRID_S = 0.02
+_MOST_LAG_S = 60.0
+
+
+@dataclass(frozen=True)
+class ForcesOptions:
+    """How a simulator's file of forces is meant."""
+
+    title = "another simulator's forces"
+
+    simulated_force_on: str = option(
+        "tool", "on which the simulated forces act", choices=("tool", "object"), flag="--simulated-force-on"
+    )
+    clock_offset_s: float | None = option(
+        None,
+        "added to the clock of the simulated forces; 0 where it is known to be the recording's",
+        unit="s",
+        low=-1e10,
+        high=1e10,
+    )
+
+
+@dataclass(frozen=True)
+class Forces:
+    """t: (n,) s, increasing. force: (n, 3) N. name: of simulator or file. notes: what was told of them.
+    chosen: (p,) bool, presses of the recording that the simulator was run over; None: all."""
+
+    t: np.ndarray
+    force: np.ndarray
+    name: str
+    notes: tuple[str, ...] = ()
+    chosen: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """force: (n, 3) N on the tool at the rows of the presses. usable: (p,) bool. notes: in words."""
+
+    force: np.ndarray
+    usable: np.ndarray
+    notes: tuple[str, ...]
+
+
+def read_forces(path: Path | str) -> Forces:
+    """`t,fx,fy,fz` (s, N); further columns are left alone. Raises RecordingError for what is no such file."""
+    path = Path(path)
+    with reading(path, RecordingError), open(path, encoding="utf-8-sig", errors="replace") as file:
+        header = [name.strip().lower() for name in file.readline().split(",")]
+        missing = [name for name in COLUMNS if name not in header]
+        if missing:
+            raise RecordingError(
+                f"'{path}' lacks the columns {', '.join(missing)}: needed are t,fx,fy,fz (s, N on the tool)"
+            )
+        table = np.genfromtxt(file, delimiter=",", usecols=[header.index(c) for c in COLUMNS], ndmin=2)
+    if not len(table):
+        raise RecordingError(f"'{path}' has no rows: needed is one a sample of the recorded path")
+    return sorted_forces(table[:, 0], table[:, 1:], path.name)
+
+
+def sorted_forces(t: np.ndarray, force: np.ndarray, name: str) -> Forces:
+    """Rows without a number left out, sorted by time; raises RecordingError where fewer than two are left."""
+    notes = []
+    good = np.isfinite(t) & np.isfinite(force).all(axis=1)
+    if not good.all():
+        notes.append(f"{(~good).sum()} rows without a number were left out")
+    t, force = t[good], force[good]
+    order = np.argsort(t, kind="stable")
+    if (np.diff(order) < 0).any():
+        notes.append("the rows were sorted by time")
+    t, force = t[order], force[order]
+    new = np.append(True, np.diff(t) > 0) if len(t) else np.zeros(0, bool)
+    if not new.all():
+        notes.append(f"{(~new).sum()} rows repeat a time: the first of each was taken")
+    if new.sum() < 2:
+        raise RecordingError(f"'{name}' has fewer than two rows with numbers: needed is one a sample")
+    return Forces(t[new], force[new], name, tuple(notes))
+
+
+def aligned(given: Forces, presses: Presses, options: ForcesOptions) -> Aligned:
+    """The forces at the presses' rows, on the tool, by straight lines between samples.
+
+    Raises OptionError where they are of another time, point the other way, or fit another clock far better.
+    """
+    notes = list(given.notes)
+    t = given.t + (options.clock_offset_s or 0.0)
+    force = given.force if options.simulated_force_on == "tool" else -given.force
+    _same_time(t, presses)
+    if options.clock_offset_s is None:
+        _same_clock(t, force, presses)
+    at = np.column_stack([np.interp(presses.t, t, f, left=0.0, right=0.0) for f in force.T])
+    rows = presses.counted if given.chosen is None else presses.counted & given.chosen[presses.press]
+    _same_direction(at, presses, rows)
+    _of_newtons(at, presses, rows, notes)
+    step, own = float(np.median(np.diff(t))), 1.0 / presses.sample_rate_hz
+    if abs(step / own - 1) > 0.05:
+        notes.append(
+            f"rows come at {1 / step:.4g} Hz, the recording's at {1 / own:.4g} Hz: straight lines between"
+        )
+    usable = _without_gaps(t, presses, step)
+    if given.chosen is not None:
+        return Aligned(at, usable & given.chosen, tuple(notes))
+    if not usable.all():
+        notes.append(
+            f"{(~usable).sum()} of {len(usable)} presses were left out: rows are missing for over "
+            f"{1e3 * LONGEST_GAP_S:g} ms"
+        )
+    return Aligned(at, usable, tuple(notes))
+
+
+def _same_time(t: np.ndarray, presses: Presses) -> None:
+    inside = ((presses.onset_s >= t[0]) & (presses.end_s <= t[-1])).mean()
+    if inside >= 0.5:
+        return
+    first = float(presses.t[0])
+    raise OptionError(
+        f"the simulated forces run from {t[0]:.6g} to {t[-1]:.6g} s, and {1 - inside:.0%} of the presses lie "
+        f"outside (they begin at {first:.6g} s): state --clock-offset, s, which is added to the file's clock"
+    )
+
+
+def _same_clock(t: np.ndarray, force: np.ndarray, presses: Presses) -> None:
+    """Refuse a clock that another offset would fit far better."""
+    clock = np.arange(presses.t[0], presses.t[-1], _GRID_S)
+    air = np.zeros(len(clock))
+    for part in presses.parts:
+        own = slice(*np.searchsorted(clock, [presses.t[part][0], presses.t[part][-1]]))
+        net = np.linalg.norm(presses.force[part] - presses.free_air[part], axis=1)
+        air[own] = np.interp(clock[own], presses.t[part], net)
+    size = np.interp(clock, t, np.linalg.norm(force, axis=1), left=0.0, right=0.0)
+    if not size.std() > 0 or not air.std() > 0:
+        return
+    most = min(round(_MOST_LAG_S / _GRID_S), len(clock) // 2)
+    a, b = air - air.mean(), size - size.mean()
+    length = 2 ** int(np.ceil(np.log2(2 * len(a))))
+    product = np.fft.irfft(np.fft.rfft(a, length) * np.conj(np.fft.rfft(b, length)), length)
+    lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
+    likeness = product[lags] / (len(a) * air.std() * size.std())
+    best = int(np.argmax(likeness))
+    lag = lags[best] * _GRID_S
+    if abs(lag) > LAG_S and likeness[best] > likeness[0] + BETTER:
+        raise OptionError(
+            f"the simulated forces fit the recording {lag:+.3g} s later far better (likeness "
+            f"{likeness[best]:.2f} against {likeness[0]:.2f}): is it another clock? State "
+            f"--clock-offset {lag:.3g}, or 0 to keep it as it is"
+        )
+
+
+def _same_direction(at: np.ndarray, presses: Presses, rows: np.ndarray) -> None:
+    measured = (presses.force - presses.free_air)[rows]
+    size = np.sqrt((measured**2).sum() * (at[rows] ** 2).sum())
+    cosine = float((measured * at[rows]).sum() / size) if size > 0 else 0.0
+    if cosine < AGAINST:
+        raise OptionError(
+            f"the simulated forces point against the measured ones (cosine {cosine:.2f}): is it the force on "
+            "the object? State --simulated-force-on object"
+        )
+
+
+def _of_newtons(at: np.ndarray, presses: Presses, rows: np.ndarray, notes: list[str]) -> None:
+    measured = np.sqrt((presses.force[rows] ** 2).sum(axis=1).mean())
+    size = np.sqrt((at[rows] ** 2).sum(axis=1).mean())
+    if not size > 0:
+        raise OptionError(
+            "the simulated forces are zero wherever the recording touches: is it the same path?"
+        )
+    if not 1 / OTHER_UNIT < size / measured < OTHER_UNIT:
+        notes.append(
+            f"the simulated forces are {size / measured:.3g} times the measured ones: are they in newtons?"
+        )
+
+
+def _without_gaps(t: np.ndarray, presses: Presses, step: float) -> np.ndarray:
+    """(p,) bool: presses that have rows throughout."""
+    longest = max(LONGEST_GAP_S, 2.5 * step)
+    left, right = t[:-1], t[1:]
+    wide = right - left > longest
+    usable = np.ones(len(presses), bool)
+    for p, (onset, end) in enumerate(zip(presses.onset_s, presses.end_s, strict=True)):
+        inside = (left[wide] < end + 0.5 * LEAD_S) & (right[wide] > onset - 0.5 * LEAD_S)
+        usable[p] = not inside.any() and onset >= t[0] and end <= t[-1]
+    return usable

@@ -1,0 +1,280 @@
+"""From a recording, its model and another simulator's forces to where, why and how far these are off."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from diagnose.numerics.registry import NAMES, numerical
+from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from diagnose.other_simulator.advice import advice_of
+from diagnose.other_simulator.against_law import Numerics
+from diagnose.other_simulator.beside import Sides, beside, named_numerics
+from diagnose.other_simulator.forces import Forces, ForcesOptions, aligned
+from diagnose.other_simulator.parts import (
+    Parameter,
+    Reality,
+    Weighing,
+    law_at,
+    measured_parameters,
+    reality_of,
+    wrong_parameters,
+)
+from diagnose.other_simulator.result import Part, SimulatedGap, Simulator
+from diagnose.other_simulator.sizes import sizes_alone
+from diagnose.other_simulator.stated import Stated
+from diagnose.pipeline import diagnose, with_tip_of
+from diagnose.search.gaps import closed_share
+from diagnose.verdict.answer import Answer, Findings
+from diagnose.verdict.result import Diagnosis, EffectEntry
+from diagnose.verdict.where import locate
+from mechanics.errors import DiagnosisError
+from mechanics.model.model import Model
+from mechanics.progress import Progress, part, silent
+from mechanics.recording.recording import Recording
+from reconstruct.presses_on_model import presses_on
+
+OWN_MODULUS = "stated_modulus"
+
+
+@dataclasses.dataclass(frozen=True)
+class Asked:
+    """What is asked of a simulation: its forces, what it was given, how the file is meant; of one run
+    here its version, advice by numerical effect, settings in words, and greatest Poisson's ratio."""
+
+    forces: Forces
+    stated: Stated
+    options: ForcesOptions = dataclasses.field(default_factory=ForcesOptions)
+    version: str = ""
+    advice: dict[str, str] = dataclasses.field(default_factory=dict)
+    run_as: str = ""
+    poisson_limit: float = math.inf
+
+
+def diagnose_simulated(
+    recording: Recording,
+    model: Model,
+    asked: Asked,
+    options: DiagnoseOptions | None = None,
+    progress: Progress = silent,
+    *,
+    nuisance: NuisanceOptions | None = None,
+    attribution: AttributionOptions | None = None,
+    reality: Diagnosis | None = None,
+) -> SimulatedGap:
+    """Diagnose the gap between a recording and another simulator's forces along its path.
+
+    reality: of the same recording and model, where it is known already. Raises OptionError where it is not
+    plain what the forces mean, DiagnosisError where the data cannot carry it.
+    """
+    options = options or DiagnoseOptions()
+    rules = attribution or AttributionOptions()
+    progress("forces", 0.0)
+    presses = presses_on(recording, model)
+    if presses.quasi_static:
+        raise DiagnosisError("points without a time have no path that a simulator could follow")
+    given = aligned(asked.forces, presses, asked.options)
+    if reality is None:
+        reality = diagnose(
+            recording, model, options, part(progress, 0.0, 0.6), nuisance=nuisance, attribution=attribution
+        )
+    findings: Findings = reality.findings
+    sides = beside(presses, with_tip_of(model, presses), given, findings, asked.stated)
+    numerics = named_numerics(sides, rules, part(progress, 0.6, 0.95))
+    result = _concluded(_weighed(asked, options, rules, reality, sides, numerics))
+    progress("done", 1.0)
+    return result
+
+
+@dataclasses.dataclass(frozen=True)
+class _Weighed:
+    """What an answer is made of. gaps: (n, 3) N, local, as the parts are taken off, by name."""
+
+    asked: Asked
+    seed: int
+    resamples: int
+    reality: Diagnosis
+    sides: Sides
+    numerics: Numerics
+    real: Reality
+    wrong: list[Parameter]
+    measured: Stated
+    weighing: Weighing
+    gaps: dict[str, np.ndarray]
+
+    def square(self, name: str) -> float:
+        """N^2, the mean square of a gap."""
+        return self.weighing.gap_n(self.gaps[name]) ** 2
+
+
+def _weighed(
+    asked: Asked,
+    options: DiagnoseOptions,
+    rules: AttributionOptions,
+    reality: Diagnosis,
+    sides: Sides,
+    numerics: Numerics,
+) -> _Weighed:
+    """The gap, and what is left of it as the parts are taken off (`diagnose.other_simulator.parts`)."""
+    findings: Findings = reality.findings
+    forward, t, rows = sides.forward, sides.forward.touches, sides.rows
+    named = {e.name: e.parameters for e in reality.entries if e.name in reality.effects}
+    real = reality_of(findings, reality.effects, numerics.strain)
+    weighing = Weighing(
+        np.where(t.counted, t.site[t.press], -1), findings.forward.touches.thinned_away, reality.noise_n
+    )
+    modulus = real.ideal.modulus[rows]
+    measured = measured_parameters(findings, asked.stated, float(np.median(modulus)), named)
+    start = real.measured[rows] - sides.raw
+    first = start + numerics.force["all"]
+    wrong = wrong_parameters(first, forward, numerics, measured, modulus, weighing, rules)
+    given = sum((p.force for p in wrong), np.zeros_like(first))
+    second = first - given
+    touched = second - (real.ideal.force[rows] - law_at(forward, asked.stated, numerics) - given)
+    end = touched - (real.full.force[rows] - real.ideal.force[rows])
+    gaps = {"simulated": start, "numerics": first, "parameters": second, "touches": touched, "reality": end}
+    if weighing.gap_n(touched) ** 2 - weighing.gap_n(end) ** 2 < (rules.smallest * reality.noise_n) ** 2:
+        real = dataclasses.replace(real, names=())  # true of the object, and no part of this gap
+    return _Weighed(
+        asked, options.seed, options.bootstrap, reality, sides, numerics, real, wrong, measured, weighing,
+        gaps,
+    )  # fmt: skip
+
+
+def _concluded(w: _Weighed) -> SimulatedGap:
+    reality, numerics, weighing = w.reality, w.numerics, w.weighing
+    findings: Findings = reality.findings
+    whole = w.square("simulated")
+
+    def part_of(before: str, after: str, names: Sequence[str]) -> Part:
+        drop = w.square(before) - w.square(after)
+        return Part(math.sqrt(max(drop, 0.0)), drop / whole, tuple(names))
+
+    parts = {
+        "numerics": part_of("simulated", "numerics", numerics.named),
+        "parameters": part_of("numerics", "parameters", [p.name for p in w.wrong]),
+        "reality": part_of("touches", "reality", w.real.names),
+    }
+    explained = sum(p.share for p in parts.values())
+    after, counts = _after(w), weighing.counts
+    closed, interval = closed_share(
+        weighing.squares(w.gaps["simulated"]), after, counts, reality.noise_n, weighing.added,
+        np.random.default_rng(w.seed), w.resamples,
+    )  # fmt: skip
+    names = _by_size(w)
+    candidates = [*numerics.candidates, *_unstated(w.asked.stated, numerics), *reality.candidates]
+    reasons = [*numerics.reasons, *(f"of our own model: {r}" for r in reality.reasons)]
+    answer = Answer(names, candidates, reasons, numerics.remainder or "unknown" in reality.kind)
+    forward = copy.copy(findings.forward)
+    kept = np.isin(forward.touches.onset_s, w.sides.forward.touches.onset_s)
+    forward.touches = forward.touches.of(kept)
+    return SimulatedGap(
+        simulator=Simulator(w.asked.forces.name, w.asked.version, w.asked.stated),
+        noise_n=reality.noise_n,
+        gap_before_n=math.sqrt(whole),
+        gap_after_n=math.sqrt(max(after.sum() / counts.sum() + weighing.added, 0.0)),
+        gap_closed=closed,
+        gap_closed_ci95=interval,
+        kind=answer.kind,
+        effects=tuple(names),
+        candidates=tuple(dict.fromkeys(c for c in candidates if c not in names)),
+        parts=parts,
+        unexplained=1 - explained,
+        unexplained_n=math.sqrt(max(whole * (1 - explained), 0.0)),
+        noise_share=min(reality.noise_n**2 / whole, 1.0),
+        touch_share=(w.square("parameters") - w.square("touches")) / whole,
+        where=locate(
+            forward, w.gaps["simulated"], findings.free, findings.site_sd[kept],
+            (w.gaps["simulated"] ** 2).sum(axis=1), seed=w.seed,
+        ),
+        entries=_entries(w, names),
+        young_modulus_pa=reality.young_modulus_pa,
+        advice=advice_of(
+            numerics, w.wrong, w.real.names, w.asked.advice,
+            unstated=bool(_unstated(w.asked.stated, numerics)), poisson_limit=w.asked.poisson_limit,
+        ),
+        notes=(*w.sides.notes, *_defaults(w.asked.stated)),
+        reasons=tuple(answer.reasons),
+        reality=reality,
+        touches=forward.touches,
+        gaps=w.gaps,
+        simulated=w.sides.raw,
+    )  # fmt: skip
+
+
+def _by_size(w: _Weighed) -> list[str]:
+    """All that is named, what changes the force most first, whatever part it is in. What reality adds is one
+    force, so its effects stand together."""
+    wrong = [p.name for p in w.wrong]
+    sizes = sizes_alone(w.sides.forward, w.numerics, wrong, w.measured, w.weighing)
+    real = w.weighing.rms_n(w.gaps["touches"] - w.gaps["reality"])
+    sizes |= {name: real for name in w.real.names}
+    return sorted(sizes, key=lambda name: -sizes[name])
+
+
+def _after(w: _Weighed) -> np.ndarray:
+    """(g,) N^2 once every named part is mended: what first touches take is not mended by anybody."""
+    kept = w.weighing.squares(w.gaps["parameters"]) - w.weighing.squares(w.gaps["touches"])
+    return w.weighing.squares(w.gaps["reality"]) + kept
+
+
+def _unstated(stated: Stated, numerics: Numerics) -> list[str]:
+    """A stiffness alike everywhere may be a modulus that nobody stated."""
+    alike = "mesh_stiffness" in numerics.named and "young_modulus_pa" not in stated.given
+    return [OWN_MODULUS] if alike else []
+
+
+def _defaults(stated: Stated) -> tuple[str, ...]:
+    """Which parameters were not said."""
+    names = [n for n in stated.as_json() if n not in stated.given]
+    if not names:
+        return ()
+    return (f"not stated, so the model's own are taken: {', '.join(names)} (--stated KEY=VALUE)",)
+
+
+def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:
+    """Every effect's line: the gap once it alone is mended."""
+    numerics, weighing, start = w.numerics, w.weighing, w.gaps["simulated"]
+    before = weighing.squares(start)
+    rng = np.random.default_rng(w.seed)
+
+    def entry(name: str, domain: str, probability: float, gap: np.ndarray, keys: dict, **more: Any) -> Any:
+        after = weighing.squares(gap)
+        closed, interval = closed_share(
+            before, after, weighing.counts, weighing.noise_n, weighing.added, rng, 100
+        )
+        return EffectEntry(name, domain, probability, weighing.gap_n(gap), closed, interval, keys, **more)
+
+    entries = [
+        entry(
+            name, numerical(name).domain, numerics.probability[name], start + numerics.force[name],
+            numerics.keys[name], gain=numerics.gain.get(name, 0.0),
+            intervals=numerics.intervals.get(name, {}),
+            confidence_set_p=numerics.confidence_set_p.get(name, float("nan")),
+            detectable_n=numerics.detectable_n.get(name, float("nan")),
+        )
+        for name in NAMES if name in numerics.keys and name in numerics.force
+    ]  # fmt: skip
+    for p in w.wrong:
+        keys = {"stated": _finite(p.stated), "measured": _finite(p.measured)}
+        entries.append(entry(p.name, "parameters", 0.95, start - p.force, keys))
+    for each in w.reality.entries:
+        if (each.name,) == w.real.names:
+            own = w.gaps["touches"] - w.gaps["reality"]
+            entries.append(
+                entry(each.name, each.domain, each.probability, start - own, each.parameters,
+                      gain=each.gain, intervals=each.intervals)
+            )  # fmt: skip
+        else:
+            entries.append(each)
+    place = {n: i for i, n in enumerate(order)}
+    return tuple(sorted(entries, key=lambda e: (place.get(e.name, 99), -e.probability, -e.gain)))
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

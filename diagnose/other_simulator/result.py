@@ -1,0 +1,145 @@
+"""The gap of another simulator: the answers of a diagnosis, and the three parts that the gap is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from diagnose.other_simulator.stated import Stated
+from diagnose.verdict.result import Diagnosis, EffectEntry
+from diagnose.verdict.where import Where
+from mechanics.presses.table import Presses
+from mechanics.result import Result
+
+PARTS = ("numerics", "parameters", "reality")
+"""In the order in which they are taken off."""
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Whose forces they are. version: "" where it is not known."""
+
+    name: str
+    version: str
+    stated: Stated
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys; `given`: which of `stated` were said, the others are the model's."""
+        return {
+            "name": self.name,
+            "version": self.version,
+            "stated": self.stated.as_json(),
+            "given": sorted(self.stated.given),
+        }
+
+
+@dataclass(frozen=True)
+class Part:
+    """gap_n: N rms that it adds to the gap. share: of the mean square of the gap (below 0: it hides
+    others). names: of the effects in it, strongest first."""
+
+    gap_n: float
+    share: float
+    names: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys, and the names."""
+        return {"gap_n": self.gap_n, "share": self.share, "effects": list(self.names)}
+
+
+@dataclass(frozen=True)
+class Mended:
+    """The same simulator, run once more. settings: in words. gap_n: N rms, to the measured force. effects:
+    what is named of it still."""
+
+    settings: str
+    gap_n: float
+    effects: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Its fields."""
+        return {"settings": self.settings, "gap_n": self.gap_n, "effects": list(self.effects)}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedGap(Result):
+    """Where, why and how far another simulator's force leaves the measured one. Gaps: N, rms of the 3-vector
+    over contact samples, the parts at places that their fits have not seen.
+
+    parts: by name of PARTS; unexplained: the share that is left, unexplained_n in N; of it noise_share is the
+    sensor's noise and touch_share what the object's own first touches take. effects: what changes the force
+    most first. reality: today's diagnosis of our ideal model. gaps: (n, 3) N, local frames of `touches`, as
+    the parts are taken off, "simulated" first. notes: what was told of the forces. mended: where it was run
+    again. `plot`: the parts as shares. `show`: the object coloured by the gap.
+    """
+
+    simulator: Simulator
+    noise_n: float
+    gap_before_n: float
+    gap_after_n: float
+    gap_closed: float | None
+    gap_closed_ci95: tuple[float, float] | None
+    kind: str
+    effects: tuple[str, ...]
+    candidates: tuple[str, ...]
+    parts: Mapping[str, Part]
+    unexplained: float
+    unexplained_n: float
+    noise_share: float
+    touch_share: float
+    where: Where
+    entries: tuple[EffectEntry, ...]
+    young_modulus_pa: float
+    advice: tuple[str, ...]
+    notes: tuple[str, ...]
+    reasons: tuple[str, ...]
+    reality: Diagnosis
+    touches: Presses
+    gaps: Mapping[str, np.ndarray] = field(default_factory=dict)
+    simulated: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    mended: Mended | None = None
+
+    @property
+    def without_numerics_n(self) -> float:
+        """N, the gap that is left once the numerics alone are mended, as it is said before that is run."""
+        return self.gap_before_n * math.sqrt(max(1 - self.parts["numerics"].share, 0.0))
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys, and some more."""
+        closed = self.gap_closed_ci95
+        return {
+            "noise_n": self.noise_n,
+            "gap_before_n": self.gap_before_n,
+            "gap_after_n": self.gap_after_n,
+            "gap_closed": self.gap_closed,
+            "gap_closed_ci95": None if closed is None else list(closed),
+            "verdict": {
+                "kind": self.kind,
+                "effects": list(self.effects),
+                "candidates": list(self.candidates),
+            },
+            "where": {
+                "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in self.where.axes],
+                "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in self.where.worst],
+                "bins": self.where.bins,
+            },
+            "effects": [e.as_json() for e in self.entries],
+            "young_modulus_pa": self.young_modulus_pa,
+            "next_touch": None if self.reality.next_touch is None else self.reality.next_touch.as_json(),
+            "simulator": self.simulator.as_json(),
+            "parts": {name: self.parts[name].as_json() for name in ("reality", "parameters", "numerics")},
+            "unexplained": self.unexplained,
+            "unexplained_n": self.unexplained_n,
+            "unexplained_of": {"noise": self.noise_share, "first_touches": self.touch_share},
+            "advice": list(self.advice),
+            "notes": list(self.notes),
+            "reasons": list(self.reasons),
+            "gap_after_measured_n": None if self.mended is None else self.mended.gap_n,
+            "gap_without_numerics_n": self.without_numerics_n,
+            "mended": None if self.mended is None else self.mended.as_json(),
+            "ideal": self.reality.as_json(),
+        }

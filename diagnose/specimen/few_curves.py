@@ -1,0 +1,130 @@
+"""The material of a specimen from fewer indentations than can be held out: laws of the dent, the machine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import t as student
+
+from diagnose.specimen.approach import APPROACH_LAWS, Approach
+from diagnose.specimen.bench import Bench
+from diagnose.specimen.result import MachineTests, Material
+from diagnose.specimen.seen import seen_of_few
+from diagnose.specimen.yielding import Machine, Way, machine_of, own_moduli, rigid_interval, way_of
+from mechanics.effects.tool_compliance import EFFECT as TOOL
+
+_WIDE = 0.1
+"""Share of the work that may stay away in a solid whose modulus is one number."""
+_LOOP = (
+    "a loop so wide, or a force that fades while the tip rests, is creep, a late force or play: press more "
+    "slowly and hold to tell them; a slow press may be as much softer as the interval says"
+)
+_ALIKE = 1.1
+"""The interval of a few curves covers laws that miss at most so many times what the best misses."""
+
+
+def _both(modulus_pa: float, own: np.ndarray, interval: tuple[float, float]) -> tuple[float, float]:
+    """Pa, 95 %: by what curves differ in ln E, own (c,) Pa, beside the fit's own interval."""
+    between = 0.0
+    if len(own) > 1:
+        between = student.ppf(0.975, len(own) - 1) * np.log(own).std(ddof=1) / np.sqrt(len(own))
+    low, high = (float(np.hypot(np.log(end / modulus_pa), between)) for end in interval)
+    return modulus_pa * float(np.exp(-low)), modulus_pa * float(np.exp(high))
+
+
+def _ways(tests: MachineTests, bench: Bench) -> list[Way]:
+    """The ways in, in the machine's size."""
+    return [
+        way_of(curve.travel, curve.force, float(at))
+        for curve, at, used in zip(tests.curves, bench.onset_m, bench.used, strict=True)
+        if used
+    ]
+
+
+def material_of_few(
+    tests: MachineTests, bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[str]
+) -> Material:
+    """Fewer curves than can be held out: the laws of the dent, the machine beside them."""
+    own = approach.modulus_pa
+    gone = "it ends in its hold"
+    if np.isfinite(approach.hysteresis):
+        gone = f"{round(100 * approach.hysteresis)} % of the work does not come back"
+    pull = float(approach.pull_n.max())
+    if pull > 0:
+        gone += f", and it pulls by up to {_force(pull)} on the way out"
+    assert tests.tip_radius_m is not None
+    ways = _ways(tests, bench)
+    slopes = [w.slope_n_per_m for w in ways if w.slope_n_per_m]
+    if slopes:
+        notes.append(f"free air slopes by {np.median(slopes):.3g} N/m of travel, which is taken off")
+    machine: Machine | None = None
+    nu = bench.model.material.poisson_ratio
+    if len(ways) > 1 or np.isfinite(approach.hysteresis):
+        machine = machine_of(ways, nu, tests.tip_radius_m, float(np.median(own)))
+    lost = approach.hysteresis if approach.hysteresis > _WIDE else 0.0
+    if lost:
+        notes.append(_LOOP)
+    limit = _ALIKE * approach.error[approach.law]
+    likely = [approach.law, *(n for n in APPROACH_LAWS if n != approach.law and approach.error[n] <= limit)]
+    onset = {"onset_m": bench.onset_m[bench.used].tolist()}
+    common = Material(
+        kind="indentation",
+        files=names,
+        curves=len(own),
+        held_out="blocks of each way in",
+        young_modulus_pa=float(own.mean()),
+        young_modulus_ci95_pa=_with_loop(
+            lost,
+            _both(
+                float(own.mean()),
+                own,
+                rigid_interval(ways, nu, tests.tip_radius_m, float(own.mean()), likely),
+            ),
+        ),
+        law=approach.law,
+        error=approach.error,
+        verdict=f"{approach.law} follows the way in best; {gone}",
+        parameters=onset,
+        notes=(*notes, "fewer than 6 curves: none can be held out, so no effect of the material is named"),
+        unknown=(*INDENTATION_UNKNOWN, "which effect, for want of curves"),
+        odds=tests.odds,
+        seen=seen_of_few(bench, approach, None),
+    )
+    if machine is None:
+        return common
+    low, high = machine.stiffness_ci95_n_per_m
+    return replace(
+        common,
+        young_modulus_pa=machine.modulus_pa,
+        young_modulus_ci95_pa=_with_loop(
+            lost,
+            _both(
+                machine.modulus_pa, own_moduli(ways, nu, tests.tip_radius_m, machine), machine.modulus_ci95_pa
+            ),
+        ),
+        seen=seen_of_few(bench, approach, machine),
+        law=machine.law,
+        error={**approach.error, "on a rigid machine": machine.rigid_error, "verdict": machine.error},
+        verdict=f"the machine yields by {machine.stiffness_n_per_m / 1e3:.3g} N/mm "
+        f"({low / 1e3:.3g} to {high / 1e3:.3g}); {gone}",
+        effects=(TOOL.name,),
+        parameters={**onset, TOOL.name: {"stiffness_n_per_m": machine.stiffness_n_per_m}},
+        notes=(*common.notes, f"on a rigid machine the modulus would be {machine.rigid_modulus_pa:.4g} Pa"),
+    )
+
+
+def _with_loop(lost: float, interval: tuple[float, float]) -> tuple[float, float]:
+    """The interval, Pa, of a modulus that a loop leaves open: it reaches down to what comes back."""
+    return (1 - lost) * interval[0], interval[1]
+
+
+def _force(newtons: float) -> str:
+    """A force as people write it, down to nanonewtons."""
+    for unit, scale in (("N", 1.0), ("mN", 1e3), ("µN", 1e6)):
+        if newtons * scale >= 0.1:
+            return f"{newtons * scale:.2g} {unit}"
+    return f"{newtons * 1e9:.2g} nN"
+
+
+INDENTATION_UNKNOWN = ("what differs from place to place", "sideways forces and friction", "Poisson's ratio")

@@ -1,0 +1,1 @@
+"""How an object gives at its places, for unit modulus: solved there, condensed, in uneven fields, kept."""

@@ -1,0 +1,119 @@
+"""The compliance of an object condensed on its touchable surface, kept with a MODEL.
+
+It is that under the Gaussian patch of mechanics.compliance.patch at the surface's corners, what a servo
+interpolates (mechanics.compliance.surface_compliance).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
+from mechanics.disk.store import content_key, load_or_build
+from mechanics.effects.hold import base_hold
+from mechanics.elastic.support import BaseHold
+from mechanics.errors import OptionError
+from mechanics.model.model import Model
+from mechanics.options import option
+from mechanics.progress import Progress, silent
+from mechanics.shape.tetmesh import TetMesh
+
+FORMS = ("auto", "dense", "low-rank")
+
+
+@dataclass(frozen=True)
+class ComplianceOptions:
+    """In which form `load_or_condense` keeps how a touch at one place moves another."""
+
+    form: str = option("auto", "dense, low-rank, or auto: low-rank for a large surface", choices=FORMS)
+    largest_dense_bytes: float = option(1.5e8, "dense table beyond which auto takes low-rank", unit="bytes")
+    low_rank_error: float = option(0.005, "relative error of a low-rank table")
+
+    def __post_init__(self) -> None:
+        if self.form not in FORMS:
+            raise OptionError(f"form is '{self.form}'; allowed are {', '.join(FORMS)}")
+        if not 1e-6 < self.low_rank_error < 0.2:
+            raise OptionError(f"low_rank_error is {self.low_rank_error}; it must lie between 1e-6 and 0.2")
+
+    def error_of(self, mesh: TetMesh) -> float | None:
+        """The low-rank error for a mesh, None where its table is to be dense."""
+        corners = len(np.unique(mesh.touchable_surface[:, :3]))
+        large = 36.0 * corners**2 > self.largest_dense_bytes
+        dense = self.form == "dense" or (self.form == "auto" and not large)
+        return None if dense else self.low_rank_error
+
+
+def compliance_key(model: Model, options: ComplianceOptions | None = None) -> str:
+    """64 hexadecimal digits over everything that the numbers of `load_or_condense` depend on."""
+    material, hold = model.material, _hold(model)
+    balls = tuple(material.inclusions.values())
+    error = (options or ComplianceOptions()).error_of(model.mesh)
+    return content_key(
+        "surface compliance 7",
+        model.mesh.points,
+        model.mesh.tetrahedra,
+        model.mesh.fixed,
+        model.mesh.touchable,
+        "" if model.mesh.shape is None else model.mesh.shape.key,
+        material.poisson_ratio,
+        model.ratio_without_balls,
+        *(() if hold is None else dataclasses.astuple(hold)),
+        *(() if error is None else ("low-rank", error)),
+        *([model.tool.tip_radius_m] if balls else []),
+        *(value for ball in balls for value in dataclasses.astuple(ball)),
+    )
+
+
+def compliance_file(key: str) -> str:
+    """Name of the cached file of that key, in the model's folder."""
+    return f"compliance-{key[:16]}.bin"
+
+
+def _hold(model: Model) -> BaseHold | None:
+    return base_hold(model.effects, model.support.normal, model.material.young_modulus_pa)
+
+
+def load_or_condense(
+    model: Model, progress: Progress = silent, *, options: ComplianceOptions | None = None
+) -> SurfaceCompliance:
+    """The servo's compliance of a model: from the cache in its folder, or computed and stored there.
+
+    The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model,
+    a damaged or a truncated file is rebuilt. Of the model's effects those of the base count
+    (mechanics.elastic.support). That of a model that was never written stays in memory until the next one's.
+    A folder that cannot be written keeps nothing. A large surface is compressed (ComplianceOptions).
+    """
+    material = model.material
+    hold = _hold(model)
+    error = (options or ComplianceOptions()).error_of(model.mesh)
+    key = compliance_key(model, options)
+
+    def build() -> dict[str, np.ndarray]:
+        made = surface_compliance(
+            model.mesh,
+            material.poisson_ratio,
+            model.ratio_without_balls,
+            balls=tuple(material.inclusions.values()),
+            hold=hold,
+            low_rank_error=error,
+            tip_radius_m=model.tool.tip_radius_m,
+            progress=progress,
+        )
+        return made.arrays()
+
+    if model.path is not None:
+        arrays = load_or_build(model.path / compliance_file(key), key, build)
+        return SurfaceCompliance.from_arrays(arrays)
+    if key not in _unwritten:
+        arrays = load_or_build(None, key, build)
+        _unwritten.clear()
+        _unwritten[key] = arrays
+    return SurfaceCompliance.from_arrays(_unwritten[key])
+
+
+_unwritten: dict[str, dict[str, np.ndarray]] = {}
+"""The last one that has no folder to be kept in: who presses a model that was never written, and then replays
+with it, waits once."""

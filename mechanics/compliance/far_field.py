@@ -1,0 +1,176 @@
+"""The far field of places in an object that is not uniform, or not of the stated Poisson's ratio.
+
+The compliance of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that
+are stiffer by m_e take their share divided by about m_e, so inclusions, gradients and skins are weights on
+one array. Another Poisson's ratio is a new factorisation, done once at a few values and interpolated.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mechanics.compliance.patch import PatchSampler, half_space_compliance
+from mechanics.compliance.pressed_places import UNIFORM, Places
+from mechanics.compliance.sites import PATCH_WIDTH_IN_EDGES, typical_edge
+from mechanics.elastic.elasticity import element_stiffness
+from mechanics.elastic.solver import Solver
+from mechanics.shape.tetmesh import TetMesh
+
+_CHUNK, _BATCH = 600, 24
+_SIX = np.triu_indices(3)
+_UNFELT, _FEW = 1e-6, 0.4
+"""Of the greatest weight: as good as none; share of the elements below which only those are summed."""
+_KNOWN = 16
+"""Far fields that are remembered: a fit moves first touches many times between two changes of the object."""
+
+
+@dataclass(frozen=True)
+class EnergyFields:
+    """energy: (q, m, 3, 3) of q places, local frames, unit modulus, 1/m. centroid: (m, 3) m, device frame.
+
+    volume: (m,) m^3. depth: (m,) m, distance of the centroid to the touchable surface. half_space: (3, 3)
+    taken off the sum, local frame. solver: of the model's own mesh, bonded. solution: (n, 3, 3 q) its nodal
+    displacements for the unit loads.
+    """
+
+    energy: np.ndarray
+    centroid: np.ndarray
+    volume: np.ndarray
+    depth: np.ndarray
+    half_space: np.ndarray
+    solver: Solver
+    solution: np.ndarray
+
+    @cached_property
+    def whole(self) -> np.ndarray:
+        """(q, 3, 3) 1/m, the sum of all elements."""
+        return self.energy.sum(axis=1, dtype=float)
+
+    @cached_property
+    def blur(self) -> float:
+        """m, one and a half edges of the middle element: what is finer is not drawn in the elements."""
+        return float(np.cbrt(np.median(self.volume))) * 1.5
+
+    @cached_property
+    def _by_element(self) -> np.ndarray:
+        """(m, 6 q) of the tensors' six numbers, so that a weighed sum reads no more, and in one go."""
+        q, m = self.energy.shape[:2]
+        six = np.empty((m, q, 6), dtype=np.float32)
+        for k, (i, j) in enumerate(zip(*_SIX, strict=True)):
+            six[:, :, k] = self.energy[:, :, i, j].T
+        return six.reshape(m, 6 * q)
+
+    def weighed(self, weight: np.ndarray) -> np.ndarray:
+        """(q, 3, 3) 1/m, the sum of the elements' energies times weight (m,)."""
+        size = np.abs(weight)
+        felt = np.flatnonzero(size > _UNFELT * size.max())
+        # a ball weighs few elements: the others are not even read
+        few = len(felt) < _FEW * len(weight)
+        own, by = (weight[felt], self._by_element[felt]) if few else (weight, self._by_element)
+        six = (own.astype(np.float32) @ by).reshape(-1, 6)
+        tensor = np.empty((len(six), 3, 3), dtype=np.float32)
+        tensor[:, _SIX[0], _SIX[1]] = tensor[:, _SIX[1], _SIX[0]] = six
+        return tensor
+
+
+def energy_fields(places: Places) -> EnergyFields:
+    """Energies of all places; solved for once."""
+    return places.stage("fields", lambda: _energies(places))
+
+
+def _energies(places: Places) -> EnergyFields:
+    model = places.model
+    # what the places were solved by serves here too, where their elements are the model's own
+    solver: Solver | None = places.stages.pop(UNIFORM, None)
+    if solver is None or len(solver.mesh.tetrahedra) != len(model.mesh.tetrahedra):
+        solver = Solver(model.mesh.quadratic(), model.material.poisson_ratio)
+    mesh = solver.mesh
+    sampler = _sampler(mesh)
+    m, q = len(mesh.tetrahedra), len(places.first)
+    u = np.zeros((len(mesh.points), 3, 3 * q))
+    flat = u.reshape(-1, 3 * q)
+    for some in _batches(q):
+        right = _unit_loads(places, mesh, sampler, some).reshape(len(flat), -1)[solver.free]
+        flat[solver.free, 3 * some.start : 3 * some.stop] = solver.solve_free(right)
+    energy = np.empty((q, m, 3, 3), dtype=np.float32)
+    for a in range(0, m, _CHUNK):
+        nodes = mesh.tetrahedra[a : a + _CHUNK]
+        stiff = element_stiffness(mesh.points[nodes[:, :4]], 2, model.material.poisson_ratio).reshape(
+            len(nodes), 30, 30
+        )
+        local = u[nodes].reshape(len(nodes), 30, 3 * q)
+        product = (stiff @ local).reshape(len(nodes), 30, q, 3)
+        energy[:, a : a + _CHUNK] = np.einsum(
+            "mxqi,mxqj->qmij", local.reshape(len(nodes), 30, q, 3), product, optimize=True
+        )
+    centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
+    depth = cKDTree(sampler._positions.reshape(-1, 3)).query(centroid)[0]
+    half = half_space_compliance(np.array([1.0, 0, 0]), model.material.poisson_ratio, sampler.width_m)
+    return EnergyFields(energy, centroid, mesh.volumes, depth, half, solver, u)
+
+
+def far_with_weights(places: Places, softness: np.ndarray) -> np.ndarray:
+    """(p, 3, 3) far field with each element's share of the compliance multiplied by softness (m,) (1:
+    unchanged)."""
+    known: dict[bytes, np.ndarray] = places.stage("far with weights", dict)
+    key = hashlib.blake2b(softness.tobytes(), digest_size=16).digest()
+    if key not in known:
+        if len(known) >= _KNOWN:
+            del known[next(iter(known))]
+        known[key] = places.far + energy_fields(places).weighed(softness - 1)[places.place]
+    return known[key].copy()
+
+
+def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30, 0.40, 0.46)) -> np.ndarray:
+    """(p, 3, 3) far field at another Poisson's ratio, interpolated between factorisations."""
+
+    def solve() -> dict[str, np.ndarray]:
+        stated = places.model.material.poisson_ratio
+        known = sorted({*ratios, stated})
+        mesh, fields = places.model.mesh.quadratic(), energy_fields(places)
+        own = (fields.whole - fields.half_space)[places.place]
+        fars = np.array([own if r == stated else _far(places, mesh, r) for r in known])
+        return {"ratios": np.array(known), "far": fars - fars[known.index(stated)]}
+
+    table = places.stage("poisson", lambda: places.stored("poisson", solve))
+    return places.far + _interpolate(table["ratios"], table["far"], nu)
+
+
+def _sampler(mesh: TetMesh) -> PatchSampler:
+    return PatchSampler(mesh, PATCH_WIDTH_IN_EDGES * typical_edge(mesh))
+
+
+def _batches(count: int) -> list[slice]:
+    return [slice(a, min(a + _BATCH, count)) for a in range(0, count, _BATCH)]
+
+
+def _unit_loads(places: Places, mesh: TetMesh, sampler: PatchSampler, some: slice) -> np.ndarray:
+    """(n, 3, 3 k) nodal forces of unit loads along the local axes of k of the places that are solved for."""
+    chosen = places.first[some]
+    forces = np.zeros((len(mesh.points), 3, 3 * len(chosen)))
+    for k, press in enumerate(chosen):
+        nodes, weights = sampler.weights(places.point[press])
+        for axis in range(3):
+            forces[nodes, :, 3 * k + axis] = weights[:, None] * places.frame[press][axis]
+    return forces
+
+
+def _far(places: Places, mesh: TetMesh, nu: float) -> np.ndarray:
+    """(p, 3, 3) local far field at another Poisson's ratio: one factorisation."""
+    sampler, solver = _sampler(mesh), Solver(mesh, nu)
+    far = np.empty((len(places.first), 3, 3))
+    for some in _batches(len(far)):
+        loads = _unit_loads(places, mesh, sampler, some).reshape(3 * len(mesh.points), -1, 3)
+        far[some] = solver.quadratic_forms(loads[solver.free])
+    return (far - half_space_compliance(np.array([1.0, 0.0, 0.0]), nu, sampler.width_m))[places.place]
+
+
+def _interpolate(x: np.ndarray, table: np.ndarray, value: float) -> np.ndarray:
+    i = int(np.clip(np.searchsorted(x, value) - 1, 0, len(x) - 2))
+    w = (value - x[i]) / (x[i + 1] - x[i])
+    return (1 - w) * table[i] + w * table[i + 1]

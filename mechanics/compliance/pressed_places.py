@@ -1,0 +1,124 @@
+"""The pressed places of a model, and what is expensive there: solved on demand, kept beside the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from mechanics.compliance.near_field import contact_width
+from mechanics.compliance.patch import PatchSampler
+from mechanics.compliance.sites import touch_sites, touch_solver
+from mechanics.disk.store import content_key, load_or_build
+from mechanics.model.model import Model
+
+VERSION = 6
+UNIFORM = "uniform solver"
+"""Stage: the factorisation that the places were solved by, of the object of one modulus."""
+GRAIN_M = 0.0008
+"""Presses that lie closer, with nearly one normal, share a solution."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """p presses on a model; device frame, SI units.
+
+    point, normal: (p, 3). frame: (p, 3, 3) rows normal, tangent, tangent. far: (p, 3, 3) far field in those
+    frames, unit modulus, 1/m. curvature, bracing: (p,) 1/m (TouchSites). stages: what effects asked to
+    compute, by name.
+    """
+
+    model: Model
+    point: np.ndarray
+    normal: np.ndarray
+    frame: np.ndarray
+    far: np.ndarray
+    curvature: np.ndarray
+    bracing: np.ndarray
+    stages: dict[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """(q,) the first press of every place that is solved for."""
+        return _shared(self.point, self.normal)[0]
+
+    @cached_property
+    def place(self) -> np.ndarray:
+        """(p,) the place, of q, of every press."""
+        return _shared(self.point, self.normal)[1]
+
+    @cached_property
+    def height(self) -> np.ndarray:
+        """(n,) m, of the mesh's nodes above the support."""
+        return self.model.support.height(self.model.mesh.points)
+
+    @cached_property
+    def under_tip(self) -> np.ndarray:
+        """(p, t) weights of the touchable surface's t triangles in what the tip feels at each press."""
+        mesh = self.model.mesh
+        sampler = PatchSampler(mesh, contact_width(self.model.tool.tip_radius_m))
+        weights = np.zeros((len(self.point), len(mesh.touchable_elements)))
+        for row, point in zip(weights, self.point, strict=True):
+            near, own = sampler.triangle_weights(point)
+            row[near] = own
+        return weights
+
+    def stored(self, name: str, build: Callable[[], Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+        """The arrays of a stage: from the model's folder where they are there, else of `build` and kept."""
+        return _stored(name, self.model, self.point, self.normal, build)
+
+    def stage(self, name: str, build: Callable[[], Any]) -> Any:
+        """What `build` gives, made once."""
+        if name not in self.stages:
+            self.stages[name] = build()
+        return self.stages[name]
+
+
+def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.ndarray) -> Places:
+    """Solve the far field at every press's place: one factorisation, three solves a place.
+
+    point, normal: (p, 3), frame: (p, 3, 3).
+    """
+    first, place = _shared(point, normal)
+    stages: dict[str, Any] = {}
+
+    def solve() -> dict[str, np.ndarray]:
+        ratio = model.element_ratio if np.ptp(model.element_ratio) > 0 else None
+        mesh, nu = model.mesh.quadratic(), model.material.poisson_ratio
+        solver = touch_solver(mesh, nu, ratio)
+        if ratio is None:
+            stages[UNIFORM] = solver
+        sites = touch_sites(mesh, point[first], normal[first], nu, solver=solver)
+        return {"far": sites.far, "curvature": sites.curvature, "bracing": sites.bracing}
+
+    sites = _stored("sites", model, point, normal, solve)
+    far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][place], frame)
+    bent = (sites["curvature"][place], sites["bracing"][place])
+    return Places(model, point, normal, frame, np.ascontiguousarray(far), *bent, stages)
+
+
+def _shared(point: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    key = np.round(np.hstack([point / GRAIN_M, normal / 0.05])).astype(int)
+    _, first, place = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return first, place.ravel()
+
+
+def _stored(
+    name: str,
+    model: Model,
+    point: np.ndarray,
+    normal: np.ndarray,
+    build: Callable[[], Mapping[str, np.ndarray]],
+) -> dict[str, np.ndarray]:
+    """A stage depends on shape and places alone: keyed by their content. Damaged files are built anew."""
+    path = None if model.path is None else model.path / f"diagnosis-{name}.cache"
+    mesh = model.mesh
+    key = content_key(
+        name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, model.element_ratio,
+        "" if mesh.shape is None else mesh.shape.key,
+        model.material.poisson_ratio, point, normal,
+    )  # fmt: skip
+    return load_or_build(path, key, build)

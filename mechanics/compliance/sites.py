@@ -1,0 +1,245 @@
+"""Touch sites: the far-field compliance of an object at given points of its surface, from one solve each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mechanics.compliance.compression import own_blocks
+from mechanics.compliance.near_field import contact_width, sharpening
+from mechanics.compliance.patch import half_space_compliance, usual_width
+from mechanics.contact.edges import edge_law
+from mechanics.elastic.solver import Solver
+from mechanics.elastic.support import BaseHold
+from mechanics.errors import MeshError
+from mechanics.frames import local_frames
+from mechanics.model.material import Ball
+from mechanics.model.moduli import with_balls
+from mechanics.progress import Progress, silent
+from mechanics.quantities import USUAL_TIP_RADIUS_M
+from mechanics.shape.refine import refined_around, refined_near_surface, typical_edge
+from mechanics.shape.tetmesh import TetMesh, vertex_normals
+
+PATCH_WIDTH_IN_EDGES = 0.8
+SURFACE_EDGE_M = 0.006
+
+
+@dataclass(frozen=True)
+class TouchSites:
+    """k touch sites of one object; device frame, SI units, unit modulus.
+
+    points, normals: (k, 3), surface points and outward unit normals.
+    curvature: (k,) 1/m, mean of the principal curvatures, positive where the object is convex.
+    far: (k, 3, 3) far-field compliance, 1/m: displacement of the patch a unit force, less that of a
+    half-space.
+    patch_width_m, poisson_ratio: what they hold for.
+    bracing: (k,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges); none
+    unless given.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    curvature: np.ndarray
+    far: np.ndarray
+    patch_width_m: float
+    poisson_ratio: float
+    bracing: np.ndarray | float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def of(self, rows: slice | np.ndarray) -> TouchSites:
+        """Some of the sites, in order."""
+        return TouchSites(
+            self.points[rows], self.normals[rows], self.curvature[rows], self.far[rows], self.patch_width_m,
+            self.poisson_ratio, self.bracing[rows],
+        )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        given = np.broadcast_to(np.asarray(self.bracing, dtype=float), (len(self.points),))
+        object.__setattr__(self, "bracing", given)
+        for name in ("points", "normals", "curvature", "far", "bracing"):
+            array = np.array(
+                getattr(self, name), dtype=float, order="C"
+            )  # a copy: the caller's stays writable
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True)
+class LoadPatch:
+    """How the load of a touch is spread. width_m: None takes `load_width`. tip_radius_m: only matters where
+    the modulus varies close below the surface (mechanics.compliance.near_field)."""
+
+    width_m: float | None = None
+    tip_radius_m: float = USUAL_TIP_RADIUS_M
+
+
+def touch_solver(
+    mesh: TetMesh,
+    poisson_ratio: float,
+    modulus_ratio: np.ndarray | None = None,
+    *,
+    balls: Sequence[Ball] = (),
+    surface_edge_m: float = SURFACE_EDGE_M,
+    hold: BaseHold | None = None,
+) -> Solver:
+    """A solver fit for touches: quadratic, the surface's elements halved until they are small enough.
+
+    A patch as narrow as the contact needs them; with wider ones, places near an edge or the base come out 3
+    to 5 % too soft. Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
+    `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out.
+    """
+    fine, parent = refined_near_surface(mesh, surface_edge_m)
+    for ball in balls:
+        fine, step = refined_around(fine, np.array(ball.centre_m), ball.radius_m, surface_edge_m)
+        parent = parent[step]
+    ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)[parent]
+    if balls:
+        ratio = with_balls(fine, ratio, balls)
+    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold)
+
+
+def patch_width(mesh: TetMesh) -> float:
+    """The width, m, of the patch of a touch on a quadratic mesh: the same for every mesh of an object.
+
+    The usual one, but at least the 0.8 edges of the surface that the elements resolve.
+    """
+    return max(PATCH_WIDTH_IN_EDGES * typical_edge(mesh), usual_width(mesh))
+
+
+def load_width(solver: Solver) -> float:
+    """The width, m, of the patch of a touch on that object: `patch_width` where it is of one modulus.
+
+    Where its modulus varies, the narrowest that its elements bear: what they add hangs on the load's width.
+    """
+    return patch_width(solver.mesh) if solver.uniform else PATCH_WIDTH_IN_EDGES * typical_edge(solver.mesh)
+
+
+def shape_under_one_patch(
+    solver: Solver, points: np.ndarray, normals: np.ndarray, width_m: float
+) -> np.ndarray:
+    """(k, 3, 3) 1/m: to add to the far field of places (k, 3) under patches of `width_m`, unit modulus.
+
+    What the shape of an object of one modulus adds to a half-space under `patch_width`, the one patch of
+    every mesh, less what it adds under theirs. Zero where the two are alike; else it takes `solver.plain`.
+    """
+    wide, nu = patch_width(solver.mesh), solver.poisson_ratio
+    if width_m >= wide:
+        return np.zeros((len(points), 3, 3))
+    under_wide, under_own = (
+        own_blocks(solver.plain, points, width) - half_space_compliance(normals, nu, width)
+        for width in (wide, width_m)
+    )
+    return under_wide - under_own
+
+
+def touch_sites(
+    mesh: TetMesh,
+    points: np.ndarray,
+    normals: np.ndarray,
+    poisson_ratio: float,
+    *,
+    solver: Solver | None = None,
+    curvature: np.ndarray | float | None = None,
+    patch: LoadPatch = LoadPatch(),
+    progress: Progress = silent,
+) -> TouchSites:
+    """Far-field compliance at surface points (k, 3) m with outward normals (k, 3).
+
+    mesh: linear or quadratic. solver: a factorisation to use, whose own mesh then counts; None makes
+    `touch_solver(mesh, poisson_ratio)`, of one modulus.
+    curvature: (k,) 1/m where the caller knows it; None estimates it from the mesh.
+    Raises MeshError for points off the surface.
+    """
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    normals = np.atleast_2d(np.asarray(normals, dtype=float))
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    if points.shape != normals.shape or points.shape[1] != 3 or not (length > 0).all():
+        raise MeshError(
+            f"points {points.shape} and normals {normals.shape} must both be (k, 3), normals not 0"
+        )
+    normals = normals / length
+    solver = solver or touch_solver(mesh, poisson_ratio)
+    width = patch.width_m or load_width(solver)
+    far = own_blocks(solver, points, width, lambda share: progress("touch sites", share))
+    far += sharpening(solver, points, width, patch.tip_radius_m)
+    far -= half_space_compliance(normals, poisson_ratio, width)
+    bracing: np.ndarray | float = 0.0
+    if patch.width_m is None:
+        far += shape_under_one_patch(solver, points, normals, width)
+        missed = edge_law(mesh, points, normals)
+        far, bracing = far + missed.far, missed.bracing
+    if curvature is None:
+        curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)
+    bent = np.broadcast_to(np.asarray(curvature, dtype=float), (len(points),))
+    return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio), bracing)
+
+
+def patch_compliance(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """(k, 3, 3) mean displacement a unit force of each patch (nodes, weights), unit modulus, 1/m."""
+    loads = patch_loads(solver.mesh, patches).reshape(-1, len(patches), 3)
+    return solver.quadratic_forms(loads[solver.free])
+
+
+def patch_loads(mesh: TetMesh, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """(n, 3, 3k) N: nodal forces of unit forces x, y, z on each patch (nodes, weights)."""
+    forces = np.zeros((len(mesh.points), 3, 3 * len(patches)))
+    for k, (nodes, weights) in enumerate(patches):
+        for axis in range(3):
+            forces[nodes, axis, 3 * k + axis] = weights
+    return forces
+
+
+def mean_curvature(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
+) -> np.ndarray:
+    """(k,) 1/m mean of the principal curvatures at surface points, convex positive."""
+    return principal_curvatures(mesh, points, normals, tip_radius_m).mean(axis=1)
+
+
+def principal_curvatures(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
+) -> np.ndarray:
+    """(k, 2) 1/m at surface points, convex positive, the greatest first.
+
+    Where the mesh's shape is known, means over the width of a tip's contact. Else of a paraboloid fitted to
+    the nodes within 1.8 surface edges whose triangles face the normal within 50 degrees: near an edge that
+    keeps the other face out. Fewer than 6 nodes count as flat.
+    """
+    if mesh.shape is not None:
+        return mesh.shape.curvatures(points, normals, contact_width(tip_radius_m))[0]
+    triangles = mesh.touchable_surface[:, :3]
+    nodes = np.unique(triangles)
+    facing = vertex_normals(mesh.points, triangles)[nodes]
+    near = cKDTree(mesh.points[nodes]).query_ball_point(points, 1.8 * typical_edge(mesh), return_sorted=True)
+    place = np.repeat(np.arange(len(points)), [len(each) for each in near])
+    node = np.concatenate([*near, []]).astype(int)
+    seen = np.einsum("nx,nx->n", facing[node], normals[place]) > np.cos(np.radians(50))
+    place, node = place[seen], node[seen]
+    frames = local_frames(normals)
+    z, x, y = np.einsum("nix,nx->in", frames[place], mesh.points[nodes[node]] - points[place])
+    fit = _least_squares(
+        np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1), z, place, len(points)
+    )
+    fit[np.bincount(place, minlength=len(points)) < 6] = 0.0
+    bent = np.stack([2 * fit[:, 3], fit[:, 4], fit[:, 4], 2 * fit[:, 5]], axis=1)
+    return np.linalg.eigvalsh(-bent.reshape(-1, 2, 2))[:, ::-1]
+
+
+def _least_squares(columns: np.ndarray, values: np.ndarray, group: np.ndarray, groups: int) -> np.ndarray:
+    """(groups, c) least-squares solutions, of the least norm, of rows (n, c) and values (n,) that belong to
+    ascending groups (n,); one without rows is zero."""
+    held = np.bincount(group, minlength=groups)
+    row = np.arange(len(group)) - np.repeat(np.cumsum(held) - held, held)
+    matrix = np.zeros((groups, held.max(initial=1), columns.shape[1]))
+    matrix[group, row] = columns
+    right = np.zeros(matrix.shape[:2])
+    right[group, row] = values
+    u, s, vt = np.linalg.svd(matrix, full_matrices=False)
+    least = np.finfo(float).eps * np.maximum(held, columns.shape[1])[:, None] * s[:, :1]
+    share = np.einsum("gmc,gm->gc", u, right) * np.divide(1.0, s, out=np.zeros_like(s), where=s > least)
+    return np.einsum("gcd,gc->gd", vt, share)

@@ -1,0 +1,187 @@
+"""The dent: laws of a rigid sphere pressed into an elastic half-space, normal force against indentation.
+
+Every law is a table over x = delta / R of four numbers, with E* = E / (1 - nu^2), G = E / (2 (1 + nu)):
+    normal force        E* R^2 c(x) (1 + k R g(x)) x^1.5    (k: mean curvature of the surface)
+    contact radius      R alpha(x) x^0.5
+    sideways stiffness  8 G / (2 - nu) R tau(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) where tau =
+    alpha)
+Hertz is c = 4/3, alpha = tau = 1, g = 0. On a curved surface R is the effective radius, which is Hertz's
+answer for a small contact; g is what a deep one on a bump or in a hollow has beyond it. One numba kernel
+reads them all, so a new law is a new table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import OptionError
+from mechanics.kernels import kernel
+from mechanics.quantities import USUAL_POISSON_RATIO
+
+DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last row holds
+_STEPS = 600
+BENT = (-0.3, 0.4)
+"""Mean curvatures times the tip's radius that curved bodies were solved for; beyond, the nearest holds."""
+_RATIOS = {
+    "linear": (0.10, 0.30, 0.40, USUAL_POISSON_RATIO),
+    "neo-hookean": (0.40, USUAL_POISSON_RATIO),
+}
+"""Poisson's ratios that a sticking law is tabulated for; straight lines between and beyond."""
+
+
+@dataclass(frozen=True)
+class DentLaw:
+    """A named law: table (n, 4) of c, alpha, tau, g at x = 0 to DEPTH_LIMIT in equal steps; its source in
+    words."""
+
+    name: str
+    table: np.ndarray
+    source: str
+
+    def force(
+        self, depth_m: np.ndarray, young_modulus_pa: float, poisson_ratio: float, tip_radius_m: float
+    ) -> np.ndarray:
+        """Force on the object along -n, N, for indentations (k,) m of a half-space (0 where not positive)."""
+        plane_strain = young_modulus_pa / (1 - poisson_ratio**2)
+        depth = np.atleast_1d(np.asarray(depth_m, dtype=float))
+        return np.array([dent_force(self.table, d, tip_radius_m, 0.0, plane_strain)[0] for d in depth])
+
+    def scaled(self, c: np.ndarray | float, tau: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
+        """The law with c and tau multiplied by factors, one or one a row of `grid()`."""
+        table = self.table.copy()
+        table[:, 0] *= c
+        table[:, 2] *= tau
+        table.setflags(write=False)
+        return DentLaw(name or self.name, table, self.source)
+
+
+@lru_cache(maxsize=64)
+def dent_law(name: str, poisson_ratio: float = USUAL_POISSON_RATIO) -> DentLaw:
+    """The law of that name for that Poisson's ratio; raises OptionError for an unknown one."""
+    if name not in _LAWS:
+        raise OptionError(f"'{name}' is no dent law; allowed are {', '.join(_LAWS)}")
+    table, source = _LAWS[name](poisson_ratio)
+    bent = _beyond_hertz() if name in _FOLLOWED else np.zeros(len(table))
+    table = np.column_stack([table, bent])
+    table.setflags(write=False)
+    return DentLaw(name, table, source)
+
+
+def dent_laws() -> tuple[str, ...]:
+    """The names of all laws."""
+    return tuple(_LAWS)
+
+
+def grid() -> np.ndarray:
+    """The indentations in tip radii at which every table is given."""
+    return np.linspace(0.0, DEPTH_LIMIT, _STEPS + 1)
+
+
+def _hertz() -> tuple[np.ndarray, str]:
+    return np.tile([4 / 3, 1.0, 1.0], (_STEPS + 1, 1)), "Hertz 1882: paraboloid, a << R"
+
+
+def _sphere() -> tuple[np.ndarray, str]:
+    # parametrised by a/R < 1, dense where the indentation grows without bound
+    a = 1 - np.geomspace(1.0, 1e-5, 40001)[1:]
+    log = np.log((1 + a) / (1 - a))
+    depth = a * log / 2
+    force = (a * a + 1) / 2 * log - a
+    x = grid()
+    c, alpha = (np.interp(x, depth, y) for y in (force / depth**1.5, a / np.sqrt(depth)))
+    return np.stack([c, alpha, alpha], axis=1), "Sneddon 1965: exact profile of a sphere, frictionless"
+
+
+def _tabulated(name: str, poisson_ratio: float) -> tuple[np.ndarray, str]:
+    """A sticking sphere grips a compressible solid, the more so the deeper: c is 6 % greater at 2 R for 0.40
+    than for 0.49."""
+    ratios = _RATIOS[name]
+    upper = int(np.clip(np.searchsorted(ratios, poisson_ratio), 1, len(ratios) - 1))
+    low, high = ratios[upper - 1 : upper + 1]
+    share = (poisson_ratio - low) / (high - low)
+    table = (1 - share) * _read(name, low) + share * _read(name, high)
+    return table, f"axisymmetric finite elements, sticking sphere, nu = {poisson_ratio:g}"
+
+
+@lru_cache(maxsize=16)
+def _read(name: str, poisson_ratio: float) -> np.ndarray:
+    usual = poisson_ratio == USUAL_POISSON_RATIO
+    suffix = "" if usual else f"_{poisson_ratio:.2f}"
+    path = Path(__file__).with_name(f"dent_{name.replace('-', '_')}{suffix}.csv")
+    x, *columns = np.loadtxt(path, delimiter=",", unpack=True)
+    return np.stack([np.interp(grid(), x, y) for y in columns], axis=1)
+
+
+@lru_cache(maxsize=1)
+def _beyond_hertz() -> np.ndarray:
+    """(n,) g of the tables: from bodies of revolution with a bump or a hollow (tools.dent_bend); deeper than
+    they were pressed it goes on as it ends."""
+    x, slope = np.loadtxt(Path(__file__).with_name("dent_bend.csv"), delimiter=",", unpack=True)
+    last = (slope[-1] - slope[-2]) / (x[-1] - x[-2])
+    return np.interp(grid(), x, slope) + last * np.maximum(grid() - x[-1], 0.0)
+
+
+_FOLLOWED = ("linear", "neo-hookean")
+"""Laws whose contact grips the tip and is followed to great depths, on curved surfaces too."""
+
+_LAWS: dict[str, Callable[[float], tuple[np.ndarray, str]]] = {
+    "hertz": lambda nu: _hertz(),
+    "sphere": lambda nu: _sphere(),
+    "linear": lambda nu: _tabulated("linear", nu),
+    "neo-hookean": lambda nu: _tabulated("neo-hookean", nu),
+}
+
+
+@kernel
+def dent_force(table, depth, radius, bend, plane_strain_modulus):
+    """(force N, stiffness N/m, stick radius R tau x^0.5 m) at an indentation, m; zeros where it is not
+    positive. radius: effective, m. bend: mean curvature of the surface times the tip's radius."""
+    if not depth > 0.0:
+        return 0.0, 0.0, 0.0
+    x = depth / radius
+    last = table.shape[0] - 1
+    step = DEPTH_LIMIT / last
+    position = x / step
+    i = int(position)
+    slope = 0.0
+    if i >= last:
+        c, tau = table[last, 0] * (1.0 + bend * table[last, 3]), table[last, 2]
+    else:
+        f = position - i
+        low = table[i, 0] * (1.0 + bend * table[i, 3])
+        high = table[i + 1, 0] * (1.0 + bend * table[i + 1, 3])
+        slope = (high - low) / step
+        c = low + f * (high - low)
+        tau = table[i, 2] + f * (table[i + 1, 2] - table[i, 2])
+    root = np.sqrt(x)
+    force = plane_strain_modulus * radius * radius * c * x * root
+    stiffness = plane_strain_modulus * radius * (1.5 * c * root + slope * x * root)
+    return force, stiffness, radius * tau * root
+
+
+def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> float | np.ndarray:
+    """Radius of the sphere whose dent in a plane equals the tip's in a surface of that mean curvature, m.
+
+    1 / R_eff = 1 / R + curvature (Hertz; convex positive). A hollow tighter than the tip is cut at 4 R.
+    """
+    return 1.0 / np.maximum(1.0 / tip_radius_m + curvature, 0.25 / tip_radius_m)
+
+
+def bend_of(
+    tip_radius_m: float, curvature: float | np.ndarray, bracing: float | np.ndarray = 0.0
+) -> float | np.ndarray:
+    """Mean curvature times the tip's radius, as `dent_force` takes it, within what `effective_radius` keeps
+    and the table of curved bodies was solved for, and what a base close below adds (mechanics.contact.edges).
+    """
+    return np.clip(np.asarray(curvature, dtype=float) * tip_radius_m, *BENT) + bracing * tip_radius_m
+
+
+@kernel
+def dent_load(depth_m):
+    """A measure of the load on a place, m^2.5, at a depth, m: its stored energy grows as a dent's."""
+    return depth_m**2.5 if depth_m > 0.0 else 0.0

@@ -1,0 +1,142 @@
+"""What the load patch misses of a touch beside a sharp rim and close above the base.
+
+The patch of a touch (mechanics.compliance.sites) is a Gaussian that reaches round a rim, where no tip
+presses, and is wider than a contact whose strain meets the base. Solved presses beside rims and above the
+base say what compliance that puts in or leaves out, and how much harder a deep dent is above the base
+(tools.dent_edge). It is laid on as Gaussians summed over the length of the rims and the area of the base, so
+it is smooth from place to place, adds up where edges meet, and ends some patch widths away. Both are numbers
+of a place: the force at it stays the slope of one energy.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mechanics.compliance.patch import usual_width
+from mechanics.shape.nearest import distance, triangle_areas
+from mechanics.shape.tetmesh import TetMesh
+
+TURN_POWER = 3
+"""Power of a rim's turn, over a right angle, with which it counts: solved for 60 and 90 degrees."""
+_REACH, _STEP = 3.5, 0.5
+"""Widths of a Gaussian beyond which it is left out (0.002); between its samples."""
+_ON_BASE = 0.12
+"""Patch widths from the base within which a crease is the base's outline, no rim."""
+_AT_ONCE = 1000
+
+
+class EdgeLaw(NamedTuple):
+    """far: (k, 3, 3) 1/m, to add to the far field, unit modulus, along the normals alone. bracing: (k,) 1/m,
+    to add to the mean curvature by which a deep dent departs from Hertz (mechanics.contact.dent.bend_of): a
+    base close below makes it harder, the more the deeper."""
+
+    far: np.ndarray
+    bracing: np.ndarray
+
+
+def edge_law(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> EdgeLaw:
+    """At places (k, 3) m with unit normals (k, 3). The base counts on every mesh, rims where its shape is
+    known."""
+    _, _, amount, bracing = fitted()
+    near, width = laid(mesh, points, normals), usual_width(mesh)
+    added = near @ amount / width
+    return EdgeLaw(added[:, None, None] * normals[:, :, None] * normals[:, None, :], near @ bracing / width)
+
+
+def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) how near places (k, 3) are to a rim, by the first Gaussian, and to the base; 0 far away, 1 on a
+    straight rim of a right angle."""
+    over_base = fitted()[1]
+    near = laid(mesh, points, normals)
+    return near[:, np.argmin(over_base)], near[:, np.argmax(over_base)]
+
+
+def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(k, g) what each Gaussian comes to at places (k, 3): 1 on a straight rim that turns by a right angle,
+    and, but for the cosine, on a plane base."""
+    widths, over_base, *_ = fitted()
+    sigma = widths * usual_width(mesh)
+    columns = []
+    for s, of_base in zip(sigma, over_base, strict=True):
+        if of_base:
+            middles, area = _base(mesh, _STEP * s)
+            columns.append(_summed(points, middles, area / (2 * np.pi * s**2), s, normals))
+        else:
+            samples, length = _rims(mesh, _STEP * s)
+            columns.append(_summed(points, samples, length / (np.sqrt(2 * np.pi) * s), s))
+    return np.stack(columns, axis=1)
+
+
+@lru_cache(maxsize=1)
+def fitted() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(g,) widths of Gaussians over the patch's; whether each is laid over the base, or else along the rims;
+    their amounts: compliance times the patch's width and the modulus; bracing times the patch's width."""
+    table = np.loadtxt(Path(__file__).with_name("dent_edge.csv"), delimiter=",", ndmin=2)
+    widths, over_base, amount, bracing = table.T
+    return widths, over_base > 0, amount, bracing
+
+
+def _summed(
+    points: np.ndarray,
+    samples: np.ndarray,
+    weight: np.ndarray,
+    sigma: float,
+    normals: np.ndarray | None = None,
+) -> np.ndarray:
+    """(k,) sums over samples (s, 3) of their weight (s,) times a Gaussian of their distance to each point;
+    times the cosine of how far below they lie where the points' normals (k, 3) are given."""
+    total = np.zeros(len(points))
+    if not len(samples) or not len(points):
+        return total
+    tree = cKDTree(samples)
+    near = np.flatnonzero(tree.query(points, distance_upper_bound=_REACH * sigma)[0] < np.inf)
+    for start in range(0, len(near), _AT_ONCE):
+        some = near[start : start + _AT_ONCE]
+        pairs = cKDTree(points[some]).sparse_distance_matrix(tree, _REACH * sigma, output_type="ndarray")
+        i, j, away = pairs["i"], pairs["j"], pairs["v"]
+        each = weight[j] * np.exp(-((away / sigma) ** 2) / 2)
+        if normals is not None:
+            below = np.einsum("kx,kx->k", points[some][i] - samples[j], normals[some][i])
+            each *= np.maximum(below / np.maximum(away, 1e-300), 0.0)
+        total[some] = np.bincount(i, each, len(some))
+    return total
+
+
+def _rims(mesh: TetMesh, step_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middles (s, 3) m of pieces of the convex rims above the base; their lengths (s,) m, by their turn."""
+    if mesh.shape is None:
+        return np.zeros((0, 3)), np.zeros(0)
+    samples, length, turn = mesh.shape.creases_cut(step_m)
+    rim, base = turn > 0, _base_triangles(mesh)
+    if rim.any() and len(base):
+        rim &= distance(mesh.points, base, samples) > _ON_BASE * usual_width(mesh)
+    return samples[rim], length[rim] * (turn[rim] / (np.pi / 2)) ** TURN_POWER
+
+
+def _base_triangles(mesh: TetMesh) -> np.ndarray:
+    corners = mesh.surface[:, :3]
+    return corners[mesh.fixed[corners].all(axis=1)]
+
+
+def _base(mesh: TetMesh, step_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middles (s, 3) m of the small triangles that the base is cut into, and their areas (s,) m^2."""
+    triangles = _base_triangles(mesh)
+    p, area = mesh.points[triangles], triangle_areas(mesh.points, triangles)
+    longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    parts = np.maximum(np.ceil(longest / step_m).astype(int), 1)
+    middles, areas = [np.zeros((0, 3))], [np.zeros(0)]
+    for count in np.unique(parts):
+        own = parts == count
+        i, j = np.divmod(np.arange(count**2), count)
+        upper = np.column_stack([i, j])[i + j < count] + 1 / 3
+        lower = np.column_stack([i, j])[i + j < count - 1] + 2 / 3
+        u, v = np.vstack([upper, lower]).T / count
+        weights = np.column_stack([1 - u - v, u, v])
+        middles.append(np.einsum("qc,tcx->tqx", weights, p[own]).reshape(-1, 3))
+        areas.append(np.repeat(area[own] / count**2, count**2))
+    return np.concatenate(middles), np.concatenate(areas)

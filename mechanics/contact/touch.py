@@ -1,0 +1,288 @@
+"""The force of a touch: a sphere that sticks to an elastic body, followed along the path of its centre.
+
+The displacement d of the tip since first touch is shared by the local dent and the compliance of the whole
+object,
+    d = dent(F) + far F / E,
+with the normal dent after a law of mechanics.contact.dent and a tangential stick: every ring of the contact
+circle holds the place where it first touched (method of dimensionality reduction with sticking springs, Popov
+& Hess 2015, equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go.
+Unilateral, no adhesion.
+
+The local frame has the normal first (mechanics.frames): n outward, then the tangents u and v.
+
+The kernels are plain numba on arrays: 1 kHz rendering, replay and fits run the same ones. `state` is a
+float array of STATE_SIZE, zero before first touch; it holds the ring memory and the last dent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from mechanics.compliance.sites import TouchSites
+from mechanics.contact.dent import DentLaw, bend_of, dent_force, dent_law, effective_radius
+from mechanics.frames import local_frames
+from mechanics.kernels import kernel
+
+_STIFFEST = 0.8  # of a contact's own compliance, the most that a near support may take away
+_RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
+STATE_SIZE = 4 + 3 * _RINGS
+"""state[0]: rings held; [1]: dent along -n, m; [2:4]: tangential dent, m; then (radius, cumulated origin)."""
+
+
+@kernel
+def _origin_integral(state, a):
+    """Integral over the radius 0..a of the tangential origin of each ring, for a within what is held."""
+    count = int(state[0])
+    low, high = 0, count - 1
+    while low < high:
+        middle = (low + high) // 2
+        if state[4 + 3 * middle] < a:
+            low = middle + 1
+        else:
+            high = middle
+    end = 4 + 3 * low
+    if low == 0:
+        a0, u0, v0 = 0.0, 0.0, 0.0
+    else:
+        a0, u0, v0 = state[end - 3], state[end - 2], state[end - 1]
+    width = state[end] - a0
+    f = (a - a0) / width if width > 0.0 else 1.0
+    return low, u0 + f * (state[end + 1] - u0), v0 + f * (state[end + 2] - v0)
+
+
+@kernel
+def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
+    """Tangential force and dent for contact radius a: free = d_t - C_tn F_n, stick = k_t / a."""
+    count = int(state[0])
+    top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
+    if a >= top:
+        # the new ring touches half way between the last dent and this one
+        new = a - top
+        mu = (state[5 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * new * state[2]
+        mv = (state[6 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * new * state[3]
+        reach = a - 0.5 * new
+    else:
+        _, mu, mv = _origin_integral(state, a)
+        reach = a
+    k = stick * reach
+    bu = free_u + stick * (cuu * mu + cuv * mv)
+    bv = free_v + stick * (cuv * mu + cvv * mv)
+    m00, m01, m11 = max(1.0 + k * cuu, 1.0 - _STIFFEST), k * cuv, max(1.0 + k * cvv, 1.0 - _STIFFEST)
+    if m01 * m01 > _STIFFEST * m00 * m11:
+        m01 = 0.0
+    det = m00 * m11 - m01 * m01
+    du = (m11 * bu - m01 * bv) / det
+    dv = (m00 * bv - m01 * bu) / det
+    return k * du - stick * mu, k * dv - stick * mv, du, dv
+
+
+@kernel
+def touch_remember(state, dent, a, du, dv, radius):
+    """Write what touch_solve found into the memory; a dent of 0 forgets everything (the tip has let go)."""
+    if not dent > 0.0:
+        state[0] = state[1] = state[2] = state[3] = 0.0
+        return
+    state[1] = dent
+    thin = radius / 64.0
+    count = int(state[0])
+    top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
+    if a > top:
+        u = (state[5 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * (a - top) * (du + state[2])
+        v = (state[6 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * (a - top) * (dv + state[3])
+        before = state[4 + 3 * (count - 2)] if count > 1 else 0.0
+        if count == 0 or (top - before >= thin and count < _RINGS):
+            count += 1
+    elif count > 0:
+        low, u, v = _origin_integral(state, a)
+        count = low + 1
+    else:
+        return
+    state[0] = count
+    end = 4 + 3 * (count - 1)
+    state[end], state[end + 1], state[end + 2] = a, u, v
+    state[2], state[3] = du, dv
+
+
+@kernel
+def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick):
+    """Force at displacement d without writing the memory: (f_n, f_u, f_v, dent, a, d_u, d_v, k_n).
+
+    Arguments as for touch_step. f: N on the tool, local frame. dent: m. a: stick radius, m. d_u, d_v:
+    tangential dent, m. k_n: slope of the normal force against pressing deeper, N/m. `touch_remember` takes
+    what it needs.
+    """
+    press = -d[0]
+    if not press > 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    cnn, cuu, cuv, cvv = far[0, 0], far[1, 1], far[1, 2], far[2, 2]
+    # no dent is deeper than what a stiffening support (1 / (1 - _STIFFEST)) makes of the whole displacement:
+    # a tip that is dragged far while it sticks must not run away
+    low, high = 0.0, (press + np.sqrt(d[1] * d[1] + d[2] * d[2])) / (1.0 - _STIFFEST)
+    dent = state[1] if 0.0 < state[1] < high else 0.5 * press
+    tolerance = 1e-10 * radius
+    fn = fu = fv = a = du = dv = stiffness = compliance = 0.0
+    for _ in range(80):
+        fn, stiffness, a = dent_force(table, dent, radius, bend, plane_strain_modulus)
+        # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
+        # that
+        compliance = max(cnn, -_STIFFEST / stiffness)
+        # near an edge the coupling may exceed what keeps the joint compliance positive definite
+        cun, cvn = far[1, 0], far[2, 0]
+        couple = cun * cun + cvn * cvn
+        held = stick * a
+        least = (1.0 / stiffness + compliance) * (1.0 / held + max(min(cuu, cvv), -_STIFFEST / held))
+        if couple > _STIFFEST * least:
+            cun *= np.sqrt(_STIFFEST * least / couple)
+            cvn *= np.sqrt(_STIFFEST * least / couple)
+        # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
+        fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[1] + cun * fn, d[2] + cvn * fn)
+        excess = dent + compliance * fn - cun * fu - cvn * fv - press
+        if excess > 0.0:
+            high = dent
+        else:
+            low = dent
+        step = -excess / (1.0 + compliance * stiffness)
+        if abs(step) < tolerance:
+            break
+        dent += step
+        if not (low < dent < high):
+            dent = 0.5 * (low + high)
+    return fn, -fu, -fv, dent, a, du, dv, stiffness / (1.0 + compliance * stiffness)
+
+
+@kernel
+def touch_step(state, d, far, table, radius, bend, plane_strain_modulus, stick):
+    """Advance one touch to displacement d: (f_n, f_u, f_v) on the tool, N, local frame (n, u, v).
+
+    state: (STATE_SIZE,), changed in place; all zero before first touch.
+    d: (3,) m since first touch, local frame (n outward: d[0] < 0 presses in).
+    far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a dent law. radius: effective,
+    m. bend: mean curvature times the tip's radius (mechanics.contact.dent.bend_of).
+    plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
+    """
+    fn, fu, fv, dent, a, du, dv, _ = touch_solve(
+        state, d, far, table, radius, bend, plane_strain_modulus, stick
+    )
+    touch_remember(state, dent, a, du, dv, radius)
+    return fn, fu, fv
+
+
+@njit(cache=True, error_model="numpy")
+def touch_path(d, frame, far, table, radius, bend, plane_strain_modulus, stick, out):
+    """Follow a path: d (n, 3) m and out (n, 3) N on the tool in the global frame; far (3, 3) m/N global."""
+    local_far = frame @ far @ frame.T
+    state = np.zeros(STATE_SIZE)
+    local = np.empty(3)
+    for i in range(d.shape[0]):
+        for r in range(3):
+            local[r] = frame[r, 0] * d[i, 0] + frame[r, 1] * d[i, 1] + frame[r, 2] * d[i, 2]
+        fn, fu, fv = touch_step(state, local, local_far, table, radius, bend, plane_strain_modulus, stick)
+        for c in range(3):
+            out[i, c] = frame[1, c] * fu + frame[2, c] * fv + frame[0, c] * fn
+
+
+@njit(cache=True, error_model="numpy")
+def _touch_paths(d, starts, frames, fars, table, radii, bends, plane_strain_modulus, stick, out):
+    for k in range(len(starts) - 1):
+        part = slice(starts[k], starts[k + 1])
+        touch_path(
+            d[part], frames[k], fars[k], table, radii[k], bends[k], plane_strain_modulus, stick, out[part]
+        )
+
+
+def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]:
+    """(E*, 8 G / (2 - nu)), Pa: what the kernels want."""
+    nu = poisson_ratio
+    return young_modulus_pa / (1 - nu**2), 4 * young_modulus_pa / ((1 + nu) * (2 - nu))
+
+
+@dataclass(frozen=True)
+class TouchedPlaces:
+    """Where k touches are. normals: (k, 3) outward unit. far: (k, 3, 3) 1/m, unit modulus (TouchSites.far).
+    curvature: (k,) or one, 1/m, mean, convex positive. bracing: (k,) or one, 1/m (TouchSites.bracing)."""
+
+    normals: np.ndarray
+    far: np.ndarray
+    curvature: np.ndarray | float = 0.0
+    bracing: np.ndarray | float = 0.0
+
+
+def touch_force(
+    displacement: np.ndarray,
+    normal: np.ndarray,
+    far: np.ndarray,
+    *,
+    young_modulus_pa: float,
+    poisson_ratio: float,
+    tip_radius_m: float,
+    curvature: float = 0.0,
+    law: str | DentLaw = "sphere",
+) -> np.ndarray:
+    """Force on the tool (n, 3), N, along the path of one touch; device frame.
+
+    displacement: (n, 3) m, the tip's centre less where it was at first touch, in order of time. normal:
+    (3,) outward. far: (3, 3) 1/m, unit modulus (TouchSites.far). curvature: 1/m, mean, convex positive.
+    """
+    starts = np.array([0, len(displacement)])
+    return touch_forces(
+        displacement,
+        starts,
+        TouchedPlaces(np.asarray(normal)[None], np.asarray(far)[None], np.array([curvature])),
+        young_modulus_pa=young_modulus_pa,
+        poisson_ratio=poisson_ratio,
+        tip_radius_m=tip_radius_m,
+        law=law,
+    )
+
+
+def touch_forces(
+    displacement: np.ndarray,
+    starts: np.ndarray,
+    places: TouchedPlaces,
+    *,
+    young_modulus_pa: float,
+    poisson_ratio: float,
+    tip_radius_m: float,
+    law: str | DentLaw = "sphere",
+) -> np.ndarray:
+    """Force on the tool (n, 3), N, of k touches whose paths follow one another.
+
+    displacement: (n, 3) m; touch i holds the rows starts[i] to starts[i + 1] (k + 1 entries) and begins
+    untouched.
+    """
+    table = (law if isinstance(law, DentLaw) else dent_law(law, poisson_ratio)).table
+    displacement = np.ascontiguousarray(displacement, dtype=float)
+    starts = np.ascontiguousarray(starts, dtype=np.int64)
+    count = len(starts) - 1
+    curvature = np.broadcast_to(np.asarray(places.curvature, dtype=float), (count,))
+    radii, bends = effective_radius(tip_radius_m, curvature), bend_of(tip_radius_m, curvature, places.bracing)
+    plane_strain, stick = moduli(young_modulus_pa, poisson_ratio)
+    out = np.zeros_like(displacement)
+    frames = local_frames(places.normals)
+    fars = np.ascontiguousarray(np.asarray(places.far, dtype=float) / young_modulus_pa)
+    _touch_paths(displacement, starts, frames, fars, table, radii, bends, plane_strain, stick, out)
+    return out
+
+
+def forces_at(
+    sites: TouchSites,
+    displacement: np.ndarray,
+    starts: np.ndarray,
+    *,
+    young_modulus_pa: float,
+    tip_radius_m: float,
+    law: str | DentLaw,
+) -> np.ndarray:
+    """`touch_forces` of one touch at each of the k sites, by what they are."""
+    return touch_forces(
+        displacement,
+        starts,
+        TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing),
+        young_modulus_pa=young_modulus_pa,
+        poisson_ratio=sites.poisson_ratio,
+        tip_radius_m=tip_radius_m,
+        law=law,
+    )

@@ -1,0 +1,329 @@
+"""Closed surfaces from the files of other programs: STL, OBJ, PLY, glTF, VTP, VTU, VTK, MSH, INP, in metres.
+
+Of a volume mesh the boundary is taken. Small or flat holes are closed, others are refused with their place;
+triangles come out outward.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mechanics.disk.reading import bounded_memory, no_file
+from mechanics.disk.vtk_files import read_vtk
+from mechanics.errors import SurfaceError
+from mechanics.quantities import parse_unit
+
+if TYPE_CHECKING:
+    import trimesh
+
+BY_TRIMESH = (".stl", ".obj", ".ply", ".gltf", ".glb", ".off", ".3mf")
+BY_VTK = (".vtp", ".vtu", ".vtk")
+BY_MESHIO = {".msh": "gmsh", ".inp": "abaqus"}
+"""And as what: of an ending that it does not know for sure it tries every reader, one of which never ends."""
+SUFFIXES = (*BY_TRIMESH, *BY_VTK, *BY_MESHIO)
+UNITS = {unit: parse_unit(unit).scale for unit in ("m", "cm", "mm", "um", "in")}
+"""Metres in a file's unit of length."""
+LEAST_M, GREATEST_M = 0.002, 2.0
+"""An object that a hand explores is so large across."""
+_SMALL, _FLAT = 0.1, 0.01
+"""Of the object's size: how wide a hole may be that is closed, how far off its plane the rim of a wider
+one."""
+
+
+@dataclass(frozen=True)
+class ClosedSurface:
+    """vertices: (n, 3) m, in the file's frame. triangles: (m, 3), outward. name: of the file. notes: what was
+    mended, in words."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    name: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def size_m(self) -> float:
+        """Greatest extent along an axis, m."""
+        return float(np.ptp(self.vertices, axis=0).max())
+
+
+def is_surface_file(path: Path | str) -> bool:
+    """Whether the name is that of a surface or mesh that can be read."""
+    return Path(path).suffix.lower() in SUFFIXES
+
+
+def read_surface(path: Path | str, unit: str = "m") -> ClosedSurface:
+    """The closed surface in a file. unit: of its lengths, one of UNITS.
+
+    Raises SurfaceError where the file is not there, holds no triangles, is open, or is of no size that a hand
+    explores.
+    """
+    path = Path(path)
+    if not is_surface_file(path):
+        allowed = ", ".join(s.removeprefix(".") for s in SUFFIXES)
+        raise SurfaceError(f"'{path}' is no surface that can be read: allowed are {allowed}")
+    if unit not in UNITS:
+        raise SurfaceError(f"--unit is '{unit}'; allowed are {', '.join(UNITS)}")
+    if not path.is_file():
+        raise SurfaceError(f"'{path}' {no_file(path)}: name a file that is there")
+    return _closed(_shell_of(path), path.name, unit)
+
+
+def surface_of(shape: Any, unit: str = "m") -> ClosedSurface:
+    """The closed surface of a file, or of a triangle mesh that has `vertices` (n, 3) in `unit` and `faces`
+    (m, 3).
+
+    Raises SurfaceError as `read_surface` does, and for what is neither.
+    """
+    import trimesh
+
+    if isinstance(shape, str | Path):
+        return read_surface(shape, unit)
+    if not (hasattr(shape, "vertices") and hasattr(shape, "faces")):
+        raise SurfaceError(
+            f"a {type(shape).__name__} is no surface: give a file, or a mesh with vertices and faces"
+        )
+    if unit not in UNITS:
+        raise SurfaceError(f"unit is '{unit}'; allowed are {', '.join(UNITS)}")
+    mesh = trimesh.Trimesh(np.array(shape.vertices, dtype=float), np.array(shape.faces), process=False)
+    return _closed(mesh, "the mesh", unit)
+
+
+def _closed(shell: trimesh.Trimesh, name: str, unit: str) -> ClosedSurface:
+    shell = _cleaned(shell)
+    if not len(shell.faces):
+        raise SurfaceError(f"'{name}' holds no triangles: export the object as a surface of triangles")
+    size = float(np.ptp(shell.vertices, axis=0).max())
+    _check_size(name, size, unit)
+    notes = _close(shell, name, UNITS[unit])
+    if shell.volume < 0:
+        shell.invert()
+    if not shell.volume > 1e-6 * size**3:
+        raise SurfaceError(f"'{name}' encloses no volume: a solid object is needed, no sheet")
+    vertices = np.asarray(shell.vertices) * UNITS[unit]
+    return ClosedSurface(vertices, np.asarray(shell.faces, dtype=np.int64), name, notes)
+
+
+def _shell_of(path: Path) -> trimesh.Trimesh:
+    """The triangles of a file, in its own unit."""
+    import trimesh
+
+    suffix = path.suffix.lower()
+    try:
+        with bounded_memory(path, SurfaceError):
+            if suffix in BY_TRIMESH:
+                loaded: Any = trimesh.load(path, force="mesh", resolver=_within(path.resolve().parent))
+                if not isinstance(loaded, trimesh.Trimesh):
+                    raise SurfaceError(f"'{path}' holds no triangles: export the object as a surface")
+                return loaded
+            if suffix in BY_VTK:
+                return _boundary(read_vtk(path, SurfaceError))
+            import meshio
+            import pyvista
+
+            with _silent():
+                return _boundary(pyvista.from_meshio(meshio.read(path, file_format=BY_MESHIO[suffix])))
+    except SurfaceError:
+        raise
+    except ImportError as error:
+        name = suffix.removeprefix(".")
+        raise SurfaceError(
+            f"'{path}' needs {error.name or 'a library'} to be read as {name}, which is not installed: "
+            "pip install 'palpate[import]'"
+        ) from error
+    except (SystemExit, Exception) as error:  # each library has errors of its own for a damaged file
+        reason = "it is damaged" if isinstance(error, SystemExit) else " ".join(str(error).split())[:200]
+        raise SurfaceError(f"'{path}' cannot be read as {suffix.removeprefix('.')} ({reason})") from error
+
+
+def _within(folder: Path) -> Any:
+    """Finds the files that a file names, in its own folder alone: trimesh below 5 follows any path."""
+    from trimesh.resolvers import FilePathResolver
+
+    class Within(FilePathResolver):
+        def get(self, name: str) -> bytes:
+            wanted = (folder / name.strip()).resolve()
+            if not (wanted.is_relative_to(folder) and wanted.is_file()):
+                raise FileNotFoundError(f"it names '{name.strip()}', which is no file in its folder")
+            return wanted.read_bytes()
+
+        def namespaced(self, namespace: str) -> Any:
+            return _within(folder / namespace)
+
+    return Within(str(folder))
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """What readers say of a damaged file goes into one line of ours."""
+    import logging
+
+    level = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        with (
+            warnings.catch_warnings(action="ignore"),
+            contextlib.redirect_stdout(io.StringIO()),
+            contextlib.redirect_stderr(io.StringIO()),
+        ):
+            yield
+    finally:
+        logging.disable(level)
+
+
+def _boundary(grid: Any) -> trimesh.Trimesh:
+    """The outer faces of a VTK data set: of its solid cells where it has any."""
+    import pyvista
+    import trimesh
+
+    if isinstance(grid, pyvista.MultiBlock):
+        grid = grid.combine()
+    if isinstance(grid, pyvista.UnstructuredGrid):
+        solid = np.isin(grid.celltypes, _SOLID)
+        grid = grid.extract_cells(np.flatnonzero(solid).tolist()) if solid.any() else grid
+    if not isinstance(grid, pyvista.PolyData):
+        grid = grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=0)
+    shell = grid.triangulate()
+    if shell.n_cells == 0 or not len(shell.faces):
+        return trimesh.Trimesh()
+    return trimesh.Trimesh(np.asarray(shell.points, dtype=float), shell.faces.reshape(-1, 4)[:, 1:])
+
+
+_SOLID = (10, 11, 12, 13, 14, 24, 25, 26, 27, 29, 37)
+"""VTK's numbers of tetrahedra, voxels, hexahedra, wedges and pyramids, linear and quadratic."""
+
+
+def _cleaned(shell: trimesh.Trimesh) -> trimesh.Trimesh:
+    """One node a place, no triangle twice or flat, all wound alike."""
+    shell.merge_vertices(merge_tex=True, merge_norm=True)
+    shell.update_faces(shell.unique_faces())
+    shell.update_faces(shell.nondegenerate_faces(height=1e-12 * max(float(shell.scale), 1e-12)))
+    shell.remove_unreferenced_vertices()
+    return shell
+
+
+def _check_size(name: str, size: float, unit: str) -> None:
+    if LEAST_M <= size * UNITS[unit] <= GREATEST_M:
+        return
+    fits = [name for name, metres in UNITS.items() if 0.01 <= size * metres <= 0.5]
+    hint = f"these look like {' or '.join(fits)}: give --unit {fits[0]}" if fits else "mend its scale"
+    raise SurfaceError(
+        f"'{name}' is {size:.4g} {unit} across; {LEAST_M:g} to {GREATEST_M:g} m are allowed: {hint}"
+    )
+
+
+def _close(shell: trimesh.Trimesh, name: str, metres: float) -> tuple[str, ...]:
+    """Close small and flat holes of the shell in place; what was done. Raises SurfaceError for other
+    holes."""
+    if shell.is_watertight:
+        _wind(shell)
+        return ()
+    size = float(np.ptp(shell.vertices, axis=0).max())
+    rims = _rims(shell)
+    for rim in rims:
+        points = shell.vertices[rim]
+        width, middle = float(np.ptp(points, axis=0).max()), points.mean(axis=0)
+        off = np.linalg.svd(points - middle)[2][2] @ (points - middle).T
+        if width > _SMALL * size and np.abs(off).max() > _FLAT * size:
+            place = ", ".join(f"{1e3 * metres * x:.4g}" for x in middle)
+            raise SurfaceError(
+                f"'{name}' is open: a hole {1e3 * metres * width:.4g} mm wide at ({place}) mm, neither small "
+                "nor flat; close it in the program that made the file"
+            )
+    new = [face for rim in rims for face in _lid(shell.vertices, rim)]
+    shell.faces = np.vstack([shell.faces, np.array(new).reshape(-1, 3)])
+    _wind(shell)
+    if not shell.is_watertight:
+        edges, counts = np.unique(shell.edges_sorted, axis=0, return_counts=True)
+        bad = shell.vertices[edges[counts != 2]].reshape(-1, 3).mean(axis=0)
+        place = ", ".join(f"{1e3 * metres * x:.4g}" for x in bad)
+        raise SurfaceError(
+            f"'{name}' is not closed near ({place}) mm: every edge must belong to two triangles; mend it in "
+            "the program that made the file"
+        )
+    return (f"{len(rims)} hole{'s' * (len(rims) > 1)} closed",)
+
+
+def _wind(shell: trimesh.Trimesh) -> None:
+    """Turn triangles in place so that neighbours agree, outward."""
+    import pyvista
+
+    if shell.is_winding_consistent:
+        return
+    drawn = pyvista.PolyData.from_regular_faces(np.asarray(shell.vertices), np.asarray(shell.faces))
+    drawn = drawn.compute_normals(
+        cell_normals=True, point_normals=False, consistent_normals=True, auto_orient_normals=True
+    )
+    shell.faces = drawn.regular_faces
+
+
+def _rims(shell: trimesh.Trimesh) -> list[np.ndarray]:
+    """Closed chains of the nodes along edges of one triangle alone."""
+    directed = shell.edges
+    _, inverse, counts = np.unique(shell.edges_sorted, axis=0, return_inverse=True, return_counts=True)
+    following: dict[int, list[int]] = {}
+    for a, b in directed[counts[inverse.ravel()] == 1]:
+        following.setdefault(int(a), []).append(int(b))
+        following.setdefault(int(b), []).append(int(a))
+    rims = []
+    while following:
+        start = next(iter(following))
+        chain = [start]
+        while following.get(chain[-1]):
+            nxt = following[chain[-1]].pop()
+            following[nxt].remove(chain[-1])
+            if nxt == start:
+                break
+            chain.append(nxt)
+        for node in [n for n, others in following.items() if not others]:
+            del following[node]
+        if len(chain) > 2:
+            rims.append(np.array(chain))
+    return rims
+
+
+def _lid(vertices: np.ndarray, rim: np.ndarray) -> list[tuple[int, int, int]]:
+    """Triangles over a rim, by cutting ears in its own plane."""
+    points = vertices[rim] - vertices[rim].mean(axis=0)
+    flat = points @ np.linalg.svd(points, full_matrices=False)[2][:2].T
+    after = np.roll(flat, -1, axis=0)
+    if (flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum() < 0:
+        rim, flat = rim[::-1], flat[::-1]
+    left = list(range(len(rim)))
+    made = []
+    while len(left) > 3:
+        at = _ear(flat, left)
+        a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
+        made.append((int(rim[a]), int(rim[b]), int(rim[c])))
+        del left[at]
+    return [*made, (int(rim[left[0]]), int(rim[left[1]]), int(rim[left[2]]))]
+
+
+def _ear(flat: np.ndarray, left: list[int]) -> int:
+    """Which of the nodes that are left can be cut off: the corner of the widest angle that holds no other."""
+    best, widest = 0, -np.inf
+    points = flat[left]
+    for at in range(len(left)):
+        a, b, c = points[at - 1], points[at], points[(at + 1) % len(left)]
+        one, two = b - a, c - b
+        turn = one[0] * two[1] - one[1] * two[0]
+        if turn <= 0:
+            continue
+        others = np.delete(points, [at - 1 if at else len(left) - 1, at, (at + 1) % len(left)], axis=0)
+        sides = [
+            (q - p)[0] * (others[:, 1] - p[1]) - (q - p)[1] * (others[:, 0] - p[0])
+            for p, q in ((a, b), (b, c), (c, a))
+        ]
+        if (np.minimum.reduce(sides) >= 0).any():
+            continue
+        sharp = -float(np.linalg.norm(c - a))
+        if sharp > widest:
+            best, widest = at, sharp
+    return best

@@ -1,0 +1,1 @@
+"""A linear elastic body by finite elements: stiffness, its solution, how the base is held."""

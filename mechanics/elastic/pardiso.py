@@ -1,0 +1,244 @@
+"""MKL Pardiso for symmetric positive definite matrices: factor, solve, Schur complement. Absent where MKL
+is.
+
+Only this module speaks to the library; `available()` tells whether it is there (x86-64 wheels of
+pypardiso).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+_DEFINITE, _INDEFINITE = 2, -2  # the library's names of real symmetric matrices
+
+
+@cache
+def _library() -> ctypes.CDLL | None:
+    # where MKL's wheels put it; pypardiso walks through the whole environment, seconds in a process
+    for path in (
+        *Path(sys.prefix, "lib").glob("libmkl_rt.*"),
+        *Path(sys.prefix, "Library/bin").glob("mkl_rt.*"),
+    ):
+        with contextlib.suppress(OSError):
+            return ctypes.CDLL(str(path))
+    try:
+        from pypardiso import PyPardisoSolver
+
+        library = PyPardisoSolver().libmkl
+    except (ImportError, OSError):
+        return None
+    library.pardiso.argtypes = None  # pypardiso's typed pointers; this handle to the library is our own
+    return library
+
+
+def available() -> bool:
+    """True where MKL Pardiso can be loaded."""
+    return _library() is not None
+
+
+def _mkl() -> ctypes.CDLL:
+    library = _library()
+    if library is None:
+        raise ImportError("MKL Pardiso cannot be loaded: install pypardiso, or take another backend")
+    return library
+
+
+def invert(matrix: np.ndarray) -> int:
+    """Inverse of a symmetric positive definite matrix (C order) in its upper triangle; 0, or the failing row.
+
+    Cholesky in MKL. The OpenBLAS of SciPy's wheels ends the process at 16,000 unknowns on two threads.
+    """
+    size, info = ctypes.c_int32(len(matrix)), ctypes.c_int32(0)
+    lower = ctypes.c_char(b"L")  # in Fortran's order
+    data = ctypes.c_void_p(matrix.ctypes.data)
+    for step in (_mkl().dpotrf, _mkl().dpotri):
+        step(ctypes.byref(lower), ctypes.byref(size), data, ctypes.byref(size), ctypes.byref(info))
+        if info.value:
+            return int(info.value)
+    return 0
+
+
+def _integer(value: int) -> object:
+    return ctypes.byref(ctypes.c_int32(value))
+
+
+def _pointer(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+class Pardiso:
+    """A factorisation of a symmetric positive definite matrix; frees MKL's memory when it dies.
+
+    matrix: (n, n) sparse, both triangles stored. With `schur` (indices of k unknowns) the factorisation
+    stops there and writes the dense (k, k) Schur complement on those unknowns, in ascending order of index,
+    to `out`, C-contiguous and zero before. Raises ArithmeticError where the matrix is not positive definite.
+    """
+
+    def __init__(
+        self,
+        matrix: sp.csr_matrix,
+        schur: np.ndarray | None = None,
+        *,
+        out: np.ndarray | None = None,
+        definite: bool = True,
+    ) -> None:
+        upper = sp.triu(matrix, format="csr")
+        upper.sort_indices()
+        self._kind = _DEFINITE if definite else _INDEFINITE
+        self.size = upper.shape[0]
+        self._values = np.ascontiguousarray(upper.data, dtype=np.float64)
+        self._rows = upper.indptr.astype(np.int32)
+        self._columns = upper.indices.astype(np.int32)
+        self._handle = np.zeros(64, dtype=np.int64)
+        self._iparm = np.zeros(64, dtype=np.int32)
+        self._iparm[0] = 1  # the values below, not the library's defaults
+        self._iparm[1] = 2  # nested dissection
+        self._iparm[17] = -1  # tell the number of nonzeros in the factor
+        self._iparm[34] = 1  # zero-based indices
+        self._perm = np.zeros(self.size, dtype=np.int32)
+        if schur is not None:
+            self._perm[schur] = 1
+            self._iparm[35] = 1  # only the Schur complement, no factors to solve with
+        self._call(12, np.zeros(1), np.zeros(1) if out is None else out, 0)
+        self.factor_nonzeros = int(self._iparm[17])
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solutions for right-hand sides (n,) or (n, r)."""
+        right = np.asfortranarray(right, dtype=np.float64)
+        solution = np.zeros_like(right, order="F")
+        self._call(33, right, solution, 1 if right.ndim == 1 else right.shape[1])
+        return solution
+
+    def half_solve(self, right: np.ndarray) -> np.ndarray:
+        """L^-1 P b for right-hand sides (n, r), A = P' L L' P: b' A^-1 c is the product of two halves."""
+        right = np.asfortranarray(right, dtype=np.float64)
+        half = np.zeros_like(right, order="F")
+        self._call(331, right, half, right.shape[1])
+        return half
+
+    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int) -> None:
+        error = ctypes.c_int32(0)
+        _mkl().pardiso(
+            _pointer(self._handle),
+            _integer(1),
+            _integer(1),
+            _integer(self._kind),
+            _integer(phase),
+            _integer(self.size),
+            _pointer(self._values),
+            _pointer(self._rows),
+            _pointer(self._columns),
+            _pointer(self._perm),
+            _integer(count),
+            _pointer(self._iparm),
+            _integer(0),
+            _pointer(right),
+            _pointer(solution),
+            ctypes.byref(error),
+        )
+        if error.value:
+            raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")
+
+    def free(self) -> None:
+        """Release the factor."""
+        if self._handle.any():
+            self._call(-1, np.zeros(1), np.zeros(1), 0)
+            self._handle[:] = 0
+
+    def __del__(self) -> None:
+        if not sys.is_finalizing() and getattr(self, "_handle", None) is not None:
+            self.free()
+
+
+class PartialFactor:
+    """Symmetric matrices of one pattern, factorised with k unknowns kept last: Schur complement and halves.
+
+    upper: (n, n) upper triangle with its diagonal, CSR, sorted. kept: (k,) indices, ascending. The
+    fill-reducing ordering is found once, here; `refresh` serves every later matrix of the pattern.
+    """
+
+    def __init__(self, upper: sp.csr_matrix, kept: np.ndarray) -> None:
+        self.size, self._kept = upper.shape[0], np.asarray(kept)
+        self._rows = upper.indptr.astype(np.int32)
+        self._columns = upper.indices.astype(np.int32)
+        self._kind = _DEFINITE
+        self._now: _Phases | None = None
+
+    def refresh(self, values: np.ndarray) -> np.ndarray:
+        """Factorise the matrix of these values (nnz,); the Schur complement (k, k) on the kept unknowns.
+
+        Cholesky where the matrix is positive definite; LDL' from the first that is not.
+        """
+        if self._kind == _DEFINITE:
+            with contextlib.suppress(ArithmeticError):
+                return self._refresh(values)
+            self._kind = _INDEFINITE
+        return self._refresh(values)
+
+    def _refresh(self, values: np.ndarray) -> np.ndarray:
+        if self._now is None or self._now.kind != self._kind:
+            self._now = _Phases(self._kind, self._rows, self._columns, self._kept)
+        return self._now.factorise(values)
+
+    def forward(self, right: np.ndarray) -> np.ndarray:
+        """(n,) what `backward` needs of b (n,); its kept entries are b_k - A_ki A_ii^-1 b_i."""
+        assert self._now is not None, "refresh comes first"
+        return self._now.solve(331, right)
+
+    def backward(self, half: np.ndarray, kept: np.ndarray) -> np.ndarray:
+        """x (n,) whose kept entries are `kept` (k,), from the result of `forward`."""
+        assert self._now is not None, "refresh comes first"
+        if self._now.kind == _INDEFINITE:
+            half = self._now.solve(332, half)
+        half = half.copy()
+        half[self._kept] = kept
+        return self._now.solve(333, half)
+
+
+class _Phases:
+    """One handle of the library for one kind of matrix; it keeps its ordering and the last factor."""
+
+    def __init__(self, kind: int, rows: np.ndarray, columns: np.ndarray, kept: np.ndarray) -> None:
+        self.kind, self._rows, self._columns = kind, rows, columns
+        self.size, self._count = len(rows) - 1, len(kept)
+        self._handle, self._iparm = np.zeros(64, dtype=np.int64), np.zeros(64, dtype=np.int32)
+        # values of our own, nested dissection, perturbed pivots, Schur complement with factors, zero-based
+        for place, value in ((0, 1), (1, 2), (9, 13 if kind == _DEFINITE else 8), (34, 1), (35, 2)):
+            self._iparm[place] = value
+        self._perm = np.zeros(self.size, dtype=np.int32)
+        self._perm[kept] = 1
+        self._values = np.ones(len(columns))
+        self._call(11, np.zeros(1), np.zeros(1))
+
+    def factorise(self, values: np.ndarray) -> np.ndarray:
+        self._values = np.ascontiguousarray(values, dtype=np.float64)
+        schur = np.zeros((self._count, self._count))
+        self._call(22, np.zeros(self.size), schur)
+        return 0.5 * (schur + schur.T)
+
+    def solve(self, phase: int, right: np.ndarray) -> np.ndarray:
+        right, solution = np.ascontiguousarray(right, dtype=np.float64), np.zeros(self.size)
+        self._call(phase, right, solution)
+        return solution
+
+    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray) -> None:
+        error = ctypes.c_int32(0)
+        _mkl().pardiso(
+            _pointer(self._handle), _integer(1), _integer(1), _integer(self.kind), _integer(phase),
+            _integer(self.size), _pointer(self._values), _pointer(self._rows), _pointer(self._columns),
+            _pointer(self._perm), _integer(1), _pointer(self._iparm), _integer(0), _pointer(right),
+            _pointer(solution), ctypes.byref(error),
+        )  # fmt: skip
+        if error.value:
+            raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")
+
+    def __del__(self) -> None:
+        if not sys.is_finalizing() and self._handle.any():
+            self._call(-1, np.zeros(1), np.zeros(1))

@@ -1,0 +1,183 @@
+"""The two files of a recording: NAME.csv or NAME.csv.gz, columns of numbers under a header, and NAME.toml,
+whose keys stand here with their ranges."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.disk.reading import no_file, reading
+from mechanics.disk.schema import ANY, Key, Listed, Schema
+from mechanics.disk.surface_files import UNITS
+from mechanics.disk.writing import Kind
+from mechanics.errors import RecordingError
+from mechanics.quantities import POISSON_RATIO, TIP_RADIUS
+from mechanics.recording.segments import STATED
+
+REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
+QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
+MOST_SAMPLES = 10_000_000
+"""Of a recording, also where its clock is filled at the sample rate: 2.7 hours at 1 kHz."""
+_MOST_TEXT, _MOST_UNPACKED = 2 << 30, 200
+"""Bytes of samples, and of unpacked ones a packed byte (numbers pack to a fifth)."""
+
+
+class _Bounded(io.RawIOBase):
+    """A stream that refuses to go on for ever: a small packed file may hold terabytes."""
+
+    def __init__(self, path: Path, most: int) -> None:
+        packed = path.suffix == ".gz"
+        self._file: Any = gzip.open(path) if packed else open(path, "rb")
+        self._left, self._path = most, path
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        count = self._file.readinto(buffer)
+        self._left -= count
+        if self._left < 0:
+            raise RecordingError(f"'{self._path}' unpacks to more than any recording holds: it is none")
+        return count
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+
+def read_samples(path: Path) -> dict[str, np.ndarray]:
+    """Columns by name; raises RecordingError where the header or a row does not fit.
+
+    Numbers are ASCII, so that other columns may hold text of any encoding that begins with ASCII.
+    """
+    with reading(path, RecordingError):
+        size = path.stat().st_size
+        most = min(_MOST_TEXT, _MOST_UNPACKED * size + (1 << 20)) if path.suffix == ".gz" else _MOST_TEXT
+        raw = io.BufferedReader(_Bounded(path, most), 1 << 18)
+        with io.TextIOWrapper(raw, encoding="utf-8-sig", errors="surrogateescape") as file:
+            first = file.readline(1 << 16)
+            if "\0" in first or len(first) >= 1 << 16:
+                raise RecordingError(f"'{path}' is no text of comma-separated numbers: save it as UTF-8 CSV")
+            header = [name.strip() for name in first.split(",")]
+            missing = [c for c in REQUIRED_COLUMNS if c not in header]
+            if missing:
+                shown = ascii(", ".join(header))[1:-1]
+                raise RecordingError(
+                    f"'{path}' lacks the columns {', '.join(missing)} (its header has "
+                    f"{shown if len(shown) < 200 else shown[:200] + '...'}): needed are "
+                    f"{', '.join(REQUIRED_COLUMNS)}"
+                )
+            wanted = [c for c in (*REQUIRED_COLUMNS, *QUATERNION_COLUMNS) if c in header]
+            twice = [c for c in wanted if header.count(c) > 1]
+            if twice:
+                raise RecordingError(f"'{path}' has the column {twice[0]} twice: leave one of them out")
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", UserWarning)  # of empty lines and files
+                    values = np.loadtxt(
+                        file, delimiter=",", usecols=[header.index(c) for c in wanted], ndmin=2,
+                        comments=None, max_rows=MOST_SAMPLES + 1,
+                    )  # fmt: skip
+            except ValueError as error:
+                raise RecordingError(
+                    f"'{path}' has a row that is not {len(header)} decimal numbers: {ascii(str(error))[1:-1]}"
+                ) from error
+    if len(values) > MOST_SAMPLES:
+        raise RecordingError(
+            f"'{path}' has more than {MOST_SAMPLES} samples: cut it, or sample it more slowly"
+        )
+    return dict(zip(wanted, values.T, strict=True))
+
+
+SCHEMA: Schema = {
+    "recording": {
+        "sample_rate_hz": Key(low=60.0, high=1e5, unit="Hz"),
+        "force_on": Key(str, choices=("tool", "object"), required=True),
+        "boundary_phase": Key(size=2, unit="s"),
+        "quasi_static": Key(bool),
+        "read_rate_hz": Key(low=1e-3, high=1e5, unit="Hz"),
+    },
+    "tool": {
+        "tip_radius_m": TIP_RADIUS,
+        "mass_kg": Key(low=0.0, high=5.0, unit="kg"),
+        "calibration": Key(str),
+    },
+    "sensor": {
+        "force_noise_std_n": Key(low=0.0, high=10.0, unit="N"),
+        "position_resolution_m": Key(low=0.0, high=0.01, unit="m"),
+    },
+    "object": {
+        "name": Key(str),
+        "poisson_ratio": POISSON_RATIO,
+        "model": Key(str),
+        "shape": Key(str),
+        "shape_unit": Key(str, choices=tuple(UNITS)),
+        "shape_pose": Key(str, choices=("auto", "given")),
+        "shape_up": Key(str),
+        "shape_sink_m": Key(low=0.0, high=1.0, unit="m"),
+        "slab_m": Key(low=1e-6, high=2.0, unit="m"),
+        "half_space": Key(bool),
+    },
+    "segment": Listed(
+        {
+            "kind": Key(str, choices=STATED, required=True),
+            "start_s": Key(unit="s", required=True),
+            "end_s": Key(unit="s", required=True),
+        }
+    ),
+    "import": ANY,
+    "truth": ANY,
+}
+"""What a recording's TOML may hold; further keys are left alone."""
+
+
+def recording_files(path: Path | str) -> tuple[Path, Path]:
+    """(samples, description) for a recording named by its .csv, .csv.gz or .toml."""
+    path = Path(path)
+    if path.name.endswith(".csv.gz"):
+        stem = path.name.removesuffix(".csv.gz")
+    elif path.suffix in (".csv", ".toml"):
+        stem = path.name.removesuffix(path.suffix)
+    else:
+        raise RecordingError(f"'{path}' is no recording: name its .csv, .csv.gz or .toml")
+    if path.suffix == ".toml":
+        candidates = [path.with_name(stem + ending) for ending in (".csv.gz", ".csv")]
+        samples = next((c for c in candidates if c.exists()), candidates[1])
+    else:
+        samples = path
+    description = path.with_name(stem + ".toml")
+    for file in (samples, description):
+        if not file.is_file():
+            raise RecordingError(
+                f"'{file}' {no_file(file)}: a recording is NAME.csv (or NAME.csv.gz) "
+                "and NAME.toml side by side"
+            )
+    return samples, description
+
+
+def samples_path(path: Path | str) -> Path:
+    """Where the samples of a recording to be written go; raises RecordingError for another ending."""
+    path = Path(path)
+    if path.suffix == ".toml":
+        path = path.with_suffix(".csv.gz")
+    if not path.name.endswith((".csv", ".csv.gz")):
+        raise RecordingError(f"'{path}' must end in .csv, .csv.gz or .toml")
+    return path
+
+
+def description_of(path: Path) -> list[tuple[Path, Kind]]:
+    path = samples_path(path)
+    stem = path.name.removesuffix(".gz").removesuffix(".csv")
+    return [(path.with_name(stem + ".toml"), DESCRIPTION)]
+
+
+DESCRIPTION = Kind("a recording's description", (b"[recording]",))
+SAMPLES = Kind(
+    "a recording", (",".join(REQUIRED_COLUMNS).encode(),), likely_bytes=1 << 24, goes=samples_path,
+    beside=description_of,
+)  # fmt: skip

@@ -1,0 +1,105 @@
+"""Split tetrahedra: those next to the touchable surface, for a narrow load patch, and those of a nodule."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechanics.robust import weighted_median
+from mechanics.shape.nearest import triangle_areas
+from mechanics.shape.tetmesh import EDGES, TetMesh
+
+
+def typical_edge(mesh: TetMesh) -> float:
+    """Edge length of the touchable surface at a place drawn at random on it, m: the median by area.
+
+    By number, a spot of tiny triangles (the mesher leaves one now and then) would count as the whole surface.
+    """
+    p = mesh.points[mesh.touchable_surface[:, :3]]
+    edges = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2)
+    area = triangle_areas(mesh.points, mesh.touchable_surface)
+    return weighted_median(edges.ravel(), np.repeat(area, 3))
+
+
+def refined_near_surface(mesh: TetMesh, surface_edge_m: float) -> tuple[TetMesh, np.ndarray]:
+    """(linear mesh, parent) with the touchable surface's median edge at most `surface_edge_m`, m.
+
+    Every edge longer than that with an end on the touchable surface is halved, as often as it takes.
+    parent: (m,) the tetrahedron of `mesh` that each new one lies in. Nodes of the linear mesh keep their
+    place at the front. Shape and base stay as they are: new nodes lie on straight edges.
+    """
+    mesh = mesh.linear()
+    parent = np.arange(len(mesh.tetrahedra))
+    for _ in range(4):
+        if typical_edge(mesh) <= surface_edge_m:
+            break
+        on_surface = np.zeros(len(mesh.points), dtype=bool)
+        on_surface[np.unique(mesh.touchable_surface)] = True
+        mesh, step = _halved(mesh, on_surface, surface_edge_m)
+        parent = parent[step]
+    return mesh, parent
+
+
+def refined_around(
+    mesh: TetMesh, centre_m: np.ndarray, radius_m: float, edge_m: float
+) -> tuple[TetMesh, np.ndarray]:
+    """(linear mesh, parent) with the edges longer than `edge_m` of a sphere's tetrahedra halved once."""
+    mesh = mesh.linear()
+    inside = np.linalg.norm(mesh.points - np.asarray(centre_m), axis=1) < radius_m + edge_m / 2
+    return _halved(mesh, inside, edge_m)
+
+
+def _halved(mesh: TetMesh, chosen: np.ndarray, edge_m: float) -> tuple[TetMesh, np.ndarray]:
+    """One round: the longer edges with an end on a chosen node are bisected once.
+
+    The longest first, which keeps neighbours conforming.
+    """
+    n = len(mesh.points)
+    tets = mesh.tetrahedra
+    ends = np.sort(tets[:, EDGES].reshape(-1, 2), axis=1)
+    pairs = np.column_stack(np.divmod(np.unique(ends[:, 0] * np.int64(n) + ends[:, 1]), n))
+    length = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
+    marked = pairs[chosen[pairs].any(axis=1) & (length > edge_m)]
+    if not len(marked):
+        return mesh, np.arange(len(tets))
+    length = np.linalg.norm(mesh.points[marked[:, 0]] - mesh.points[marked[:, 1]], axis=1)
+    marked = marked[np.argsort(-length, kind="stable")]
+    points = np.vstack([mesh.points, mesh.points[marked].mean(axis=1)])
+    key = marked[:, 0] * n + marked[:, 1]
+    order = np.argsort(key)
+    parent = np.arange(len(tets))
+    while True:
+        ends = np.sort(tets[:, EDGES], axis=2)
+        old = (ends < n).all(axis=2)
+        wanted = np.where(old, ends[..., 0] * n + ends[..., 1], -1)
+        found = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
+        rank = np.where(key[order][found] == wanted, order[found], len(key))
+        first = rank.argmin(axis=1)
+        rows = np.flatnonzero(rank[np.arange(len(tets)), first] < len(key))
+        if not len(rows):
+            break
+        edge = EDGES[first[rows]]
+        middle = n + rank[rows, first[rows]]
+        one, other = tets[rows].copy(), tets[rows].copy()
+        one[np.arange(len(rows)), edge[:, 0]] = middle
+        other[np.arange(len(rows)), edge[:, 1]] = middle
+        tets = tets.copy()
+        tets[rows] = one
+        tets = np.vstack([tets, other])
+        parent = np.concatenate([parent, parent[rows]])
+    quadratic = _edge_flags(mesh, marked)
+    fixed = np.concatenate([mesh.fixed, quadratic[0]])
+    touchable = np.concatenate([mesh.touchable, quadratic[1]])
+    return TetMesh(points, tets, fixed, touchable), parent
+
+
+def _edge_flags(mesh: TetMesh, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(fixed, touchable) of the middles of `edges` (k, 2), by the rule of TetMesh.quadratic."""
+    n = len(mesh.points)
+    key = edges[:, 0] * np.int64(n) + edges[:, 1]
+
+    def on(triangles: np.ndarray) -> np.ndarray:
+        pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        return np.isin(key, pairs[:, 0] * np.int64(n) + pairs[:, 1])
+
+    fixed = on(mesh.surface[mesh.fixed[mesh.surface].all(axis=1)])
+    return fixed, on(mesh.touchable_surface) & ~fixed

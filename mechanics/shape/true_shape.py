@@ -1,0 +1,279 @@
+"""The shape itself, as its file has it: triangles that are chords of curved faces, curved again.
+
+Cubic patches (PN triangles: Vlachos et al., Curved PN Triangles, 2001) stand on the file's triangles. Their
+corner normals are weighted so that they are exact on a sphere and on a cylinder (Max, Weights for computing
+vertex normals, 1999). Plane faces stay plane where a fillet begins, and creases stay where they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from mechanics.disk.store import content_key
+from mechanics.shape.creases import Facets, angle_between, corner_normals_of, facets_of
+from mechanics.shape.nearest import closest
+
+_SAME_SIDE = np.cos(np.radians(50))
+_FACING = np.cos(np.radians(75))
+_SAMPLE_M = 1.2e-3
+"""Longest edge of the pieces that curvatures are averaged over."""
+_WIDTHS, _PAIRS = 2.7, 300_000
+"""Widths of a Gaussian beyond which it is left out (0.03); pieces that are averaged at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrueShape:
+    """A closed surface: vertices (n, 3) m, triangles (m, 3) outward by the right-hand rule; device frame."""
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name, kind in (("vertices", float), ("triangles", np.int64)):
+            value = np.array(getattr(self, name), dtype=kind, order="C")
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of its content."""
+        return content_key("true shape 1", self.vertices, self.triangles)
+
+    @cached_property
+    def corner_normals(self) -> np.ndarray:
+        """(m, 3, 3) unit outward normals of the curved shape at each triangle's corners."""
+        return corner_normals_of(self.vertices, self.triangles, self._facets)
+
+    @cached_property
+    def creases(self) -> np.ndarray:
+        """(k, 2) vertices of the edges over which the normal jumps, each once."""
+        ends = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], axis=2)
+        pairs = np.sort(ends[self._facets.crease], axis=1)
+        return np.unique(pairs, axis=0)
+
+    def crease_points(self, spacing_m: float) -> np.ndarray:
+        """(k, 3) m along all creases, at most `spacing_m` apart, none where the shape is smooth."""
+        triangle, edge = np.nonzero(self._facets.crease)
+        p = self.vertices[self.triangles[triangle]]
+        rows = np.arange(len(triangle))
+        length = np.linalg.norm(p[rows, edge] - p[rows, (edge + 1) % 3], axis=1)
+        count = np.maximum(np.ceil(length / spacing_m).astype(int), 1) + 1
+        row = np.repeat(rows, count)
+        along = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        share = along / (count[row] - 1)
+        weights = np.zeros((len(row), 3))
+        weights[np.arange(len(row)), edge[row]] = 1 - share
+        weights[np.arange(len(row)), (edge[row] + 1) % 3] += share
+        return self.on(triangle[row], weights)[0]
+
+    def creases_cut(self, longest_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Creases in straight pieces of at most `longest_m`: middles (k, 3) m, lengths (k,) m, and by what
+        angle (k,) rad the surface turns there, positive where it is convex."""
+        facets = self._facets
+        triangle, edge = np.nonzero(facets.crease & (np.arange(len(self.triangles))[:, None] < facets.across))
+        start, end = (self.vertices[self.triangles[triangle, (edge + k) % 3]] for k in (0, 1))
+        own, other = facets.unit[triangle], facets.unit[facets.across[triangle, edge]]
+        convex = np.einsum("kx,kx->k", np.cross(own, other), end - start)
+        length = np.linalg.norm(end - start, axis=1)
+        count = np.maximum(np.ceil(length / longest_m).astype(int), 1)
+        row = np.repeat(np.arange(len(triangle)), count)
+        share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
+        middles = start[row] + share[:, None] * (end - start)[row]
+        turn = np.copysign(angle_between(own, other), convex)
+        return middles, (length / count)[row], turn[row]
+
+    def on(self, triangle: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""
+        points = np.einsum("kb,kbx->kx", _bernstein(weights), self._control[triangle])
+        normals = np.einsum("kc,kcx->kx", weights, self.corner_normals[triangle])
+        return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+
+    def foot(self, points: np.ndarray, facing: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Points (k, 3) m of the curved shape nearest to points (k, 3), unit normals (k, 3) there.
+
+        facing: (k, 3) unit; where the nearest face looks away from it by more than 75 degrees, the nearest
+        of those that do not is taken: beside a rim a place stays on its own face.
+        """
+        _, triangle, weights = closest(self.vertices, self.triangles, points)
+        if facing is not None:
+            triangle, weights = self._facing(points, facing, triangle, weights)
+        return self.on(triangle, weights)
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        """(k,) m, signed, positive outside, of points (k, 3) near the curved shape."""
+        foot, normals = self.foot(points)
+        return np.einsum("ki,ki->k", points - foot, normals)
+
+    def curvatures(
+        self, points: np.ndarray, normals: np.ndarray, width_m: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Principal curvatures (k, 2) 1/m, convex positive, greatest first, and the unit direction (k, 3) of
+        the greatest, at surface points (k, 3) with normals (k, 3).
+
+        Means of the curvature tensor under a Gaussian of `width_m`, over the faces that look the same way
+        within 50 degrees: a contact feels what lies under it, and an edge is no curvature.
+        """
+        places, facing, area, bend, tree = self._bends
+        result, direction = np.zeros((len(points), 2)), np.zeros((len(points), 3))
+        reach = _WIDTHS * width_m
+        each = len(places) * np.pi * reach**2 / area.sum()
+        step = max(20, int(_PAIRS / each))
+        for start in range(0, len(points), step):
+            rows = slice(start, start + step)
+            p, n = points[rows], normals[rows]
+            pairs = cKDTree(p).sparse_distance_matrix(tree, reach, output_type="ndarray")
+            i, j = pairs["i"], pairs["j"]
+            weight = area[j] * np.exp(-((pairs["v"] / width_m) ** 2) / 2)
+            weight *= np.einsum("kx,kx->k", n[i], facing[j]) > _SAME_SIDE
+            mean = sp.csr_matrix((weight, (i, j)), shape=(len(p), len(places)))
+            total = np.maximum(np.asarray(mean.sum(axis=1)), 1e-300)
+            # each tensor turned into the place's own tangent plane, weighted
+            moved = _turned(bend[j], facing[j], n[i]) * weight[:, None, None]
+            sums = np.stack([np.bincount(i, moved[:, a, b], len(p)) for a in range(3) for b in range(3)], 1)
+            tensor = (sums / total).reshape(-1, 3, 3)
+            out = np.einsum("kx,ky->kxy", n, n)
+            # the normal's own direction is put far below, so that the two others come last
+            values, vectors = np.linalg.eigh((tensor + tensor.transpose(0, 2, 1)) / 2 - 1e9 * out)
+            result[rows] = values[:, [2, 1]]
+            direction[rows] = vectors[:, :, 2]
+        return result, direction
+
+    def _facing(
+        self, points: np.ndarray, facing: np.ndarray, triangle: np.ndarray, weights: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        away = np.flatnonzero(np.einsum("kx,kx->k", self._facets.unit[triangle], facing) < _FACING)
+        for k in away:
+            allowed = np.flatnonzero(self._facets.unit @ facing[k] > _FACING)
+            if len(allowed):
+                _, one, weights[k] = closest(self.vertices, self.triangles[allowed], points[k : k + 1])
+                triangle[k] = allowed[one[0]]
+        return triangle, weights
+
+    @cached_property
+    def _facets(self) -> Facets:
+        return facets_of(self.vertices, self.triangles)
+
+    @cached_property
+    def _control(self) -> np.ndarray:
+        return _control(self.vertices, self.triangles, self.corner_normals, self._facets)
+
+    @cached_property
+    def _bends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, cKDTree]:
+        """Places, normals, areas and curvature tensors of pieces of the surface of at most _SAMPLE_M."""
+        bend = _bends(self.vertices[self.triangles], self.corner_normals)
+        triangle, corners = _pieces(self.vertices[self.triangles], _SAMPLE_M)
+        places, facing = self.on(triangle, corners.mean(axis=1))
+        p = np.einsum("kcw,kwx->kcx", corners, self.vertices[self.triangles[triangle]])
+        area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+        # pieces of one cell that look alike count as one: a fine file takes no longer
+        cell = np.hstack([np.floor(places / _SAMPLE_M), np.rint(3 * facing)]).astype(np.int64)
+        _, cell = np.unique(cell, axis=0, return_inverse=True)
+        cell = cell.ravel()
+        total = np.bincount(cell, area)
+
+        def mean(values: np.ndarray) -> np.ndarray:
+            columns = (area[:, None] * values.reshape(len(area), -1)).T
+            sums = np.stack([np.bincount(cell, column) for column in columns], axis=1)
+            return (sums / total[:, None]).reshape(-1, *values.shape[1:])
+
+        places, facing, tensors = mean(places), mean(facing), mean(bend[triangle])
+        facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+        return places, facing, total, tensors, cKDTree(places)
+
+
+def _control(vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, facets: Facets) -> np.ndarray:
+    """(m, 10, 3) control points of the cubic patches, in the order of `_bernstein`."""
+    p = vertices[triangles]
+    beyond = normals[facets.across]
+    made = {}
+    for i in range(3):
+        for j in ((i + 1) % 3, (i + 2) % 3):
+            edge = i if (i + 1) % 3 == j else j
+            along = p[:, j] - p[:, i]
+            own = normals[:, i]
+            match = (triangles[facets.across[:, edge]] == triangles[:, i][:, None]).argmax(axis=1)
+            other = beyond[np.arange(len(p)), edge, match]
+            step = along - np.einsum("kx,kx->k", along, own)[:, None] * own
+            # a crease runs along both its faces, and both must draw it alike
+            tangent = np.cross(own, other)
+            size = np.linalg.norm(tangent, axis=1, keepdims=True)
+            tangent /= np.maximum(size, 1e-300)
+            crease = np.einsum("kx,kx->k", along, tangent)[:, None] * tangent
+            straight = np.linalg.norm(crease, axis=1) < 0.9 * np.linalg.norm(along, axis=1)
+            crease = np.where(straight[:, None], along, crease)
+            sharp = size[:, 0] > 1e-9
+            made[i, j] = p[:, i] + np.where(sharp[:, None], crease, step) / 3
+    mean = sum(made.values()) / 6
+    centre = mean + (mean - p.mean(axis=1)) / 2
+    outer = [made[pair] for pair in ((0, 1), (1, 0), (1, 2), (2, 1), (2, 0), (0, 2))]
+    return np.stack([p[:, 0], p[:, 1], p[:, 2], *outer, centre], axis=1)
+
+
+def _bernstein(weights: np.ndarray) -> np.ndarray:
+    """(k, 10) of barycentric weights (k, 3)."""
+    u, v, w = weights.T
+    outer = [3 * u * u * v, 3 * u * v * v, 3 * v * v * w, 3 * v * w * w, 3 * w * w * u, 3 * w * u * u]
+    return np.stack([u**3, v**3, w**3, *outer, 6 * u * v * w], axis=1)
+
+
+def _bends(p: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(m, 3, 3) 1/m curvature tensors of triangles (m, 3, 3) from their corners' normals, convex positive.
+
+    Least squares over the three edges (Rusinkiewicz, Estimating curvatures on triangle meshes, 2004).
+    """
+    edge = np.roll(p, -1, axis=1) - p
+    turn = np.roll(normals, -1, axis=1) - normals
+    facing = np.cross(edge[:, 0], edge[:, 1])
+    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+    u = edge[:, 0] / np.maximum(np.linalg.norm(edge[:, 0], axis=1, keepdims=True), 1e-300)
+    axes = np.stack([u, np.cross(facing, u)], axis=1)
+    x, y = np.einsum("max,mex->ame", axes, edge)
+    a, b = np.einsum("max,mex->ame", axes, turn)
+    zero = np.zeros_like(x)
+    system = np.concatenate([np.stack([x, y, zero], axis=2), np.stack([zero, x, y], axis=2)], axis=1)
+    right = np.concatenate([a, b], axis=1)
+    square = np.einsum("mei,mej->mij", system, system)
+    square += 1e-9 * np.trace(square, axis1=1, axis2=2)[:, None, None] * np.eye(3) + 1e-300 * np.eye(3)
+    e, f, g = np.linalg.solve(square, np.einsum("mei,me->mi", system, right)[..., None])[..., 0].T
+    flat = np.stack([np.stack([e, f], axis=1), np.stack([f, g], axis=1)], axis=1)
+    return np.einsum("max,mab,mby->mxy", axes, flat, axes)
+
+
+def _turned(bend: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """(k, 3, 3) tensors of the planes with unit normals `before`, turned with them the shortest way."""
+    both = before + after
+    share = 1 / np.maximum(1 + np.einsum("kx,kx->k", before, after), 1e-9)
+    a = np.einsum("kxy,ky->kx", bend, after)
+    cross = np.einsum("kx,ky->kxy", both, a)
+    square = share**2 * np.einsum("kx,kx->k", after, a)
+    outer = np.einsum("kx,ky->kxy", both, both)
+    return bend - share[:, None, None] * (cross + cross.transpose(0, 2, 1)) + square[:, None, None] * outer
+
+
+def _pieces(p: np.ndarray, longest_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (m, 3, 3) cut at the middles of their longest edges until none is longer than `longest_m`.
+
+    The triangle (k,) that each piece lies in, and its corners' weights there (k, 3, 3).
+    """
+    triangle = np.flatnonzero(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) > 1e-16)
+    corners = np.tile(np.eye(3), (len(triangle), 1, 1))
+    done_triangle, done_corners = [], []
+    while len(triangle):
+        at = np.einsum("kcw,kwx->kcx", corners, p[triangle])
+        length = np.linalg.norm(np.roll(at, -1, axis=1) - at, axis=2)
+        long = length.max(axis=1) > longest_m
+        done_triangle.append(triangle[~long])
+        done_corners.append(corners[~long])
+        triangle, corners, length = triangle[long], corners[long], length[long]
+        rows, first = np.arange(len(triangle)), length.argmax(axis=1)
+        second = (first + 1) % 3
+        middle = (corners[rows, first] + corners[rows, second]) / 2
+        one, other = corners.copy(), corners
+        one[rows, second], other[rows, first] = middle, middle
+        triangle, corners = np.concatenate([triangle, triangle]), np.concatenate([one, other])
+    return np.concatenate(done_triangle), np.concatenate(done_corners)

@@ -1,0 +1,73 @@
+"""The presses of a recording on the surface of a model, whether or not the model was made from it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechanics.errors import ContactError, NoBaseError
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
+from mechanics.recording.recording import Recording
+from reconstruct.geometry.known_base import base_of_model
+from reconstruct.geometry.stated import GeometryOptions, stated_geometry
+from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
+from reconstruct.steps.s3_contacts.left_out import off_surface, without_slides
+from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
+from reconstruct.steps.s3_contacts.straightened import laid
+from reconstruct.steps.s4_surface.casting import cast
+
+_ANY = ContactOptions(least_palpations=1)
+_FAR = 3.0
+"""Tip radii that a path stays off the model's box at least, before it is called far."""
+
+
+def presses_on(recording: Recording, model: Model) -> Presses:
+    """The model's own table where it was made from this recording; else its presses, found and cast onto the
+    model's surface. A recording that does not trace a base, or states what it lies on, stands on the model's.
+    Presses that are not on that surface (`left_out.off_surface`) are left out.
+
+    Raises ContactError where the recording holds no press on the model, or lies far from it.
+    """
+    check_near(recording, model)
+    own = model.presses
+    if own.sampled and own.recording == recording.content:
+        return own
+    found = _found(recording, model)
+    where = cast(model.mesh.points, model.mesh.touchable_surface, found.point, found.contact_normal)
+    base = base_of_model(model, recording.tip_radius_m)
+    reasons = off_surface(found, where.points, where.normals, base)
+    kept = np.array([not reason for reason in reasons])
+    if not kept.any():
+        raise ContactError(f"none of the {len(kept)} presses is on the model: the first {reasons[0]}")
+    return laid(found.of(kept), where.points[kept], where.normals[kept], _kind(recording, model))
+
+
+def _kind(recording: Recording, model: Model) -> str:
+    """Of the geometry: as the model says it, where it was placed, else as the recording states it."""
+    placed = model.about.get("geometry", {}).get("kind")
+    return str(placed or stated_geometry(recording, GeometryOptions()).kind)
+
+
+def check_near(recording: Recording, model: Model) -> None:
+    """Raises ContactError for a path that nowhere comes near the model: it is of another frame."""
+    points = model.mesh.points
+    beyond = np.maximum(points.min(axis=0) - recording.position, recording.position - points.max(axis=0))
+    away = float(np.linalg.norm(np.maximum(beyond, 0.0), axis=1).min(initial=np.inf))
+    if away > _FAR * recording.tip_radius_m:
+        raise ContactError(
+            f"'{recording.name}' lies {away:.2g} m from the model at the nearest: is it in another frame, or "
+            "of another object? give the model that was made from it"
+        )
+
+
+def _found(recording: Recording, model: Model) -> Presses:
+    if not is_points(recording) and not stated_geometry(recording, GeometryOptions()).known:
+        try:
+            return explore(recording, contact_options=_ANY).presses
+        except NoBaseError:
+            pass
+    base = base_of_model(model, recording.tip_radius_m)
+    if is_points(recording):
+        return explore_points(recording, base, _ANY).presses
+    found = explore(recording, contact_options=_ANY, boundary=base, unbroken=True)
+    return without_slides(found, _ANY.least_palpations).presses

@@ -1,0 +1,1 @@
+"""The finite-element renderer: model and compliance made ready, and its step in compiled kernels."""

@@ -1,0 +1,114 @@
+"""The finite-element renderer (its step: render.fem.kernel): model and compliance made ready for 1 kHz."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mechanics.compliance.compliance import load_or_condense
+from mechanics.compliance.surface_compliance import SurfaceCompliance
+from mechanics.errors import OptionError
+from mechanics.model.model import Model
+from mechanics.progress import Progress, silent
+from render.base import Renderer, check_radii
+from render.effects import effect_arrays, rendered_touch
+from render.fem.field import far_field
+from render.fem.kernel import fem_step
+from render.fem.state import FemParameters, FemState, new_fem_state
+from render.options import RenderOptions
+from render.surface.bvh import STACK, closest_triangle
+from render.surface.snapping import touched_surface
+
+NAME = "fem"
+
+
+class FemRenderer(Renderer):
+    """Contact, stick and slip of several spherical tips with a linear elastic object; see
+    render.fem.kernel."""
+
+    name = NAME
+    kernel = staticmethod(fem_step)
+
+    def __init__(
+        self,
+        model: Model,
+        options: RenderOptions | None = None,
+        *,
+        compliance: SurfaceCompliance | None = None,
+        progress: Progress = silent,
+    ) -> None:
+        self.model = model
+        self.options = options or RenderOptions()
+        self.compliance = compliance or load_or_condense(model, progress=progress)
+        self.contact = touched_surface(model, self.options)
+        touch = rendered_touch(model, self.options)
+        field = far_field(model, self.contact, self.compliance)
+        number = np.full(len(model.mesh.points), len(self.compliance.nodes))
+        number[self.compliance.nodes] = np.arange(len(self.compliance.nodes))
+        self._drawn = number[self.contact.nodes]
+        self.parameters = FemParameters(
+            surface=self.contact.arrays,
+            far=field.far,
+            curvature=field.curvature,
+            bracing=field.bracing,
+            softness=field.softness,
+            parents=field.parents,
+            parent_weights=self.contact.parent_weights,
+            blocks=np.array(self.compliance.blocks),
+            factor=np.array(self.compliance.factor),
+            table=np.array(touch.law_of_dent(model.material.poisson_ratio).table),
+            young_modulus_pa=np.array([model.material.young_modulus_pa]),
+            poisson_ratio=np.array([model.material.poisson_ratio]),
+            friction=np.array([touch.friction]),
+            series_compliance=np.zeros(1),
+            edition=np.zeros(1, dtype=np.int64),
+            effects=effect_arrays(touch),
+        )
+
+    def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> FemState:
+        return new_fem_state(self.parameters, check_radii(radii_m, self.model), dt_s)
+
+    def with_modulus(self, young_modulus_pa: float) -> FemRenderer:
+        if not young_modulus_pa > 0:
+            raise OptionError(f"young_modulus_pa is {young_modulus_pa}; it must be greater than 0")
+        changed = self._with(young_modulus_pa=np.array([float(young_modulus_pa)]))
+        changed.model = self.model.with_modulus(float(young_modulus_pa))
+        return changed
+
+    def with_field(self, far: np.ndarray, blocks: np.ndarray | None = None) -> FemRenderer:
+        """The same renderer with another far field (v, 3, 3), mutual table (t, t, 3, 3), 1/m, unit modulus.
+
+        For an object that changes inside while it is touched. blocks: None keeps the table.
+        """
+        if far.shape != self.parameters.far.shape or (
+            blocks is not None and blocks.shape != self.parameters.blocks.shape
+        ):
+            raise OptionError("a changed field must have the shape of the renderer's own")
+        # the compiled loop knows only arrays in C order that may be written to
+        changed = self._with(far=np.array(far, order="C"), edition=self.parameters.edition + 1)
+        if blocks is not None:
+            table = np.array(blocks, dtype=np.float32, order="C")
+            changed.parameters = changed.parameters._replace(blocks=table)
+            changed.compliance = replace(self.compliance, blocks=table.copy())
+        return changed
+
+    def _smooth_displacement(self, points: np.ndarray, forces_on_tool: np.ndarray) -> np.ndarray:
+        p, arrays = self.parameters, self.contact.arrays
+        weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
+        corners = np.zeros((len(self.compliance.nodes) + 1, 3))  # the last one stands for the base
+        for point, force in zip(points, forces_on_tool, strict=True):
+            t, _ = closest_triangle(
+                arrays.bvh, arrays.vertices, arrays.triangles, np.asarray(point), np.inf, weights, stack
+            )
+            for corner, weight in zip(p.parents[t], weights @ p.parent_weights[t], strict=True):
+                if corner >= 0:
+                    compliance = weight / p.young_modulus_pa[0]
+                    corners[:-1] -= compliance * self.compliance.displacement(corner, force)
+        return np.einsum("vc,vcx->vx", self.contact.node_weights, corners[self._drawn])
+
+
+def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
+    """The registry's entry."""
+    return FemRenderer(model, options, progress=progress)

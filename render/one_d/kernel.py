@@ -1,0 +1,141 @@
+"""The step of the 1D renderers: f = k u^r + b u^s du/dt along the contact normal, parameters by place.
+
+u is the depth of the tip below the undeformed surface, at the surface point whose normal points at the tip:
+the 1D models know no tangential force. Equations (1), (2), (5), (6) of Goksel et al. differ in r, s and b
+alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mechanics.kernels import inner, step_kernel
+from render.base import Grip, new_grip, new_state
+from render.surface.bvh import STACK
+from render.surface.contact import approach, lose, release
+from render.surface.contact_surface import SurfaceArrays
+from render.surface.walking import foot
+
+RATE_FILTER_S = 0.01  # positions come in steps of some 30 um: a raw difference is no velocity
+_NEWTON = 20
+
+
+class OneDParameters(NamedTuple):
+    """law: (v, 4) columns k (N/m^r), b (N s/m^(s+1)), r, s at the fine vertices. scale: (1,) on k and b."""
+
+    surface: SurfaceArrays
+    law: np.ndarray
+    scale: np.ndarray
+    friction: np.ndarray
+    series_compliance: np.ndarray
+
+
+class OneDState(NamedTuple):
+    """render.base.State, and: grip; rate (m,) m/s filtered; before (m,) m depth one step ago; scratch."""
+
+    forces: np.ndarray
+    touching: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    depths: np.ndarray
+    stiffness: np.ndarray
+    radii_m: np.ndarray
+    dt_s: np.ndarray
+    grip: Grip
+    rate: np.ndarray
+    before: np.ndarray
+    vectors: np.ndarray
+    stack: np.ndarray
+
+
+def new_one_d_state(radii: np.ndarray, dt_s: float) -> OneDState:
+    """A state of len(radii) tips in air."""
+    m = len(radii)
+    return OneDState(
+        *new_state(radii, dt_s),
+        grip=new_grip(m),
+        rate=np.zeros(m),
+        before=np.zeros(m),
+        vectors=np.zeros((3, 3)),
+        stack=np.zeros(STACK, dtype=np.int64),
+    )
+
+
+@inner
+def law_force(k, b, r, s, depth, rate):
+    """(force N, stiffness N/m) along the normal at a depth, m, and its rate, m/s; never pulls."""
+    if not depth > 0.0:
+        return 0.0, 0.0
+    elastic = k * depth**r
+    damping = b * depth**s
+    return max(elastic + damping * rate, 0.0), r * elastic / depth + max(s * damping / depth * rate, 0.0)
+
+
+@inner
+def _through_spring(k, b, r, s, depth, rate, compliance):
+    """`law_force` behind a spring in series: depth = u + compliance f(u)."""
+    if compliance == 0.0:
+        return law_force(k, b, r, s, depth, rate)
+    low, high, u = 0.0, depth, depth
+    force = stiffness = 0.0
+    for _ in range(_NEWTON):
+        force, stiffness = law_force(k, b, r, s, u, rate)
+        excess = u + compliance * force - depth
+        if excess > 0.0:
+            high = u
+        else:
+            low = u
+        u -= excess / (1.0 + compliance * stiffness)
+        if not (low < u < high):
+            u = 0.5 * (low + high)
+    return force, stiffness / (1.0 + compliance * stiffness)
+
+
+@step_kernel
+def one_d_step(p, state, tips):
+    """One tick: tips (m, 3) m; writes the state's forces on the tools, N. See render.base.Renderer.step."""
+    grip = state.grip
+    dt = state.dt_s[0]
+    for i in range(tips.shape[0]):
+        point, normal = state.points[i], state.normals[i]
+        radius = state.radii_m[i]
+        fresh = False
+        if not (np.isfinite(tips[i, 0]) and np.isfinite(tips[i, 1]) and np.isfinite(tips[i, 2])):
+            lose(grip, i)
+        elif grip.triangle[i] < 0:
+            fresh = (
+                approach(p.surface, grip, tips[i], i, radius, point, normal, state.vectors, state.stack) > 0
+            )
+        force = stiffness = depth = 0.0
+        if grip.triangle[i] >= 0:
+            grip.triangle[i], height = foot(
+                p.surface, grip.triangle[i], grip.weights[i], tips[i], point, normal, state.vectors[0]
+            )
+            depth = radius - height
+            if not depth > 0.0:
+                depth = 0.0
+                release(grip, i, tips[i])
+        if grip.triangle[i] >= 0:
+            if fresh:
+                state.rate[i] = 0.0
+                state.before[i] = depth
+            share = dt / (dt + RATE_FILTER_S)
+            state.rate[i] += share * ((depth - state.before[i]) / dt - state.rate[i])
+            state.before[i] = depth
+            k = b = r = s = 0.0
+            for c in range(3):
+                v, w = p.surface.triangles[grip.triangle[i], c], grip.weights[i, c]
+                k += w * p.law[v, 0]
+                b += w * p.law[v, 1]
+                r += w * p.law[v, 2]
+                s += w * p.law[v, 3]
+            k *= p.scale[0]
+            b *= p.scale[0]
+            force, stiffness = _through_spring(k, b, r, s, depth, state.rate[i], p.series_compliance[0])
+        state.touching[i] = 1 if force > 0.0 else 0
+        state.depths[i] = depth
+        state.stiffness[i] = stiffness
+        for c in range(3):
+            state.forces[i, c] = force * normal[c] if force > 0.0 else 0.0

@@ -1,0 +1,257 @@
+"""The contact surface put onto the shape that the mesh fills.
+
+A mesh of 10 mm cuts a fillet of 12 mm by a millimetre, and another mesh cuts it elsewhere. Where the shape is
+known, each vertex of the contact surface lies on it, those of creases on its creases; triangles between them
+are so small, where it bends, that they leave it by some micrometres, and lie on it in the mean. Beside sharp
+rims the contact normal turns; concave creases are rounded.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from mechanics.shape.true_shape import TrueShape
+from render.surface.triangles import cut, cut_beside, pseudonormals
+
+SAG_M = 8e-6
+"""Between the middle of a fine edge and the shape: what is more is halved."""
+EDGE_ROUNDING_M, NORMAL_SMOOTHING_M = 2.2e-3, 2.5e-3
+"""Widths of the Gaussians by which a crease is rounded, and its contact normal turned. With 1.5 mm a tip that
+slides by friction over a rim whose shape is not known stepped by 2.4 % of its force."""
+_HOLLOW_ROUNDING_M = 1.5e-3
+"""The first of the concave creases of a known shape, whose sharp rims are not rounded."""
+RIM_STRIP_M = 2e-3
+"""Width of the strip on either side of a sharp rim over which the contact normal turns. With 1.5 mm a ball of
+5 mm that slides over the rim without friction steps; with 2.5 mm places 2 mm beside it are 4 % too stiff."""
+EASED_AGREEMENT = (0.99, 0.93)
+"""Mean of the unit normals around a vertex above which nothing is eased, and below which all of it is."""
+_CREASE_SPACING_M = 1e-4
+_HOLLOW_REACH_M = 3 * NORMAL_SMOOTHING_M
+_REACH = 0.75  # fine edges from which a vertex is drawn onto a crease that its triangle crosses
+_CROSSES = np.cos(np.radians(25))
+_ROUNDS, _HALVINGS = 4, 3
+_ALIKE = 0.8
+_MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
+
+
+def halved_where_bent(
+    shape: TrueShape,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    free: np.ndarray,
+    weights: np.ndarray,
+    largest: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices and triangles with those edges halved whose middles the shape leaves by more than SAG_M.
+
+    With them the one (k,) of the given triangles that each lies in, and weights (k, 3, 3) at its corners, of
+    what interpolates over the triangles. At most `largest` triangles. Edges over creases stay.
+    """
+    within = np.arange(len(triangles))
+    for _ in range(_HALVINGS):
+        touch = triangles[free[within] > 0]
+        ends = np.sort(np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+        ends = np.unique(ends, axis=0)
+        used = np.unique(touch)
+        placed, normals = vertices.copy(), np.zeros_like(vertices)
+        placed[used], normals[used] = shape.foot(vertices[used])
+        bent = np.linalg.norm(normals[ends[:, 0]] - normals[ends[:, 1]], axis=1)
+        ends = ends[(bent > 1e-6) & (np.einsum("kx,kx->k", *normals[ends.T]) > _CROSSES)]
+        gap = np.abs(shape.distance(placed[ends].mean(axis=1)))
+        room = max(0, largest - len(triangles)) // 2  # an edge more makes two triangles more
+        chosen = np.argsort(-gap)[:room]
+        ends = ends[chosen[gap[chosen] > SAG_M]]
+        if not len(ends):
+            break
+        vertices, triangles, part, weights = cut(vertices, triangles, weights, ends)
+        within = within[part]
+    return vertices, triangles, within, weights
+
+
+class OnShape(NamedTuple):
+    """vertices (v, 3) m on the shape, contact normals (v, 3), unit, outward; triangles (k, 3), the given one
+    (k,) that each lies in, and weights (k, 3, 3) at its corners of what interpolates over the given ones."""
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    triangles: np.ndarray
+    within: np.ndarray
+    weights: np.ndarray
+
+
+def on_shape(
+    shape: TrueShape, vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray, weights: np.ndarray
+) -> OnShape:
+    """Put a contact surface onto the shape: its vertices (v, 3) m and triangles (k, 3), cut beside rims.
+
+    free: (k,) 1 where they may be touched; the base's inner vertices stay.
+    """
+    touch = triangles[free > 0]
+    used = np.unique(touch)
+    placed, normals = vertices.copy(), np.zeros_like(vertices)
+    normals[np.unique(triangles[free == 0])] = _mean_normal(vertices, triangles[free == 0])
+    placed[used], normals[used] = shape.foot(vertices[used])
+    rim = np.intersect1d(used, triangles[free == 0])
+    edge = float(np.median(np.linalg.norm(vertices[touch[:, 0]] - vertices[touch[:, 1]], axis=1)))
+    creased = _on_creases(shape, placed, normals, touch, rim, edge)
+    placed[used] = _lifted(shape, placed, normals, touch, creased)[used]
+    creased[rim] = False  # no tip gets under it
+    if not creased.any() or edge > 2 * EDGE_ROUNDING_M:
+        return OnShape(placed, normals, triangles, np.arange(len(triangles)), weights)
+    hollows = _hollows(shape)
+    hollow = creased & _beside(hollows, placed)
+    sharp = creased & ~hollow
+    if hollow.any():
+        own = np.setdiff1d(used, rim)
+        placed, normals = _eased(placed, normals, touch, own, cKDTree(placed[hollow]))
+    if not sharp.any():
+        return OnShape(placed, normals, triangles, np.arange(len(triangles)), weights)
+    line = _line(shape, placed[sharp], placed[rim])
+    before = len(placed)
+    placed, triangles, within, weights = cut_beside(
+        placed, triangles, free, weights, sharp, line, RIM_STRIP_M
+    )
+    placed[before:], facing = shape.foot(placed[before:])
+    normals = np.vstack([normals, facing])
+    own = np.setdiff1d(triangles[free[within] > 0], rim)
+    if hollow.any():
+        own = own[~_beside(hollows, placed[own])]
+    rims = np.flatnonzero(sharp)
+    between = pseudonormals(placed, triangles)[rims]
+    away = line.query(placed[own], distance_upper_bound=RIM_STRIP_M)[0]
+    own, away = own[away < RIM_STRIP_M], away[away < RIM_STRIP_M]
+    facing = between[cKDTree(placed[rims]).query(placed[own])[1]]
+    normals[own] = _towards(normals[own], facing, 1 - away / RIM_STRIP_M)
+    return OnShape(placed, normals, triangles, within, weights)
+
+
+def _line(shape: TrueShape, rims: np.ndarray, base: np.ndarray) -> cKDTree:
+    """Points along those creases that are nearer to vertices `rims` (r, 3) than to the base's."""
+    points = shape.crease_points(_CREASE_SPACING_M)
+    if len(base):
+        points = points[cKDTree(rims).query(points)[0] < cKDTree(base).query(points)[0]]
+    return cKDTree(points)
+
+
+def _hollows(shape: TrueShape) -> cKDTree:
+    """Points along the concave creases; it may hold none."""
+    middles, _, turn = shape.creases_cut(_CREASE_SPACING_M)
+    return cKDTree(middles[turn < 0])
+
+
+def _beside(hollows: cKDTree, points: np.ndarray) -> np.ndarray:
+    """(v,) bool, so close to a concave crease that it is eased."""
+    return np.isfinite(hollows.query(points, distance_upper_bound=_HOLLOW_REACH_M)[0])
+
+
+def _on_creases(
+    shape: TrueShape,
+    placed: np.ndarray,
+    normals: np.ndarray,
+    touch: np.ndarray,
+    rim: np.ndarray,
+    edge_m: float,
+) -> np.ndarray:
+    """(v,) bool, the vertices drawn onto creases: `placed` changes.
+
+    Those of the base's rim, and of a triangle's edge whose ends look to either side of a crease the nearer
+    end.
+    """
+    creased = np.zeros(len(placed), dtype=bool)
+    samples = shape.crease_points(_CREASE_SPACING_M)
+    if not len(samples):
+        return creased
+    tree = cKDTree(samples)
+    away, nearest = tree.query(placed)
+    start = np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2)
+    pairs = np.unique(np.sort(start, axis=1), axis=0)
+    wanted = np.zeros(len(placed), dtype=bool)
+    wanted[rim] = away[rim] < edge_m
+    for _ in range(_ROUNDS):
+        for vertex in np.flatnonzero(wanted):
+            creased[vertex] = True
+            placed[vertex] = samples[nearest[vertex]]
+        a, b = pairs.T
+        crosses = np.einsum("kx,kx->k", normals[a], normals[b]) < _CROSSES
+        crosses &= ~creased[a] & ~creased[b]
+        nearer = np.where(away[a] <= away[b], a, b)[crosses]
+        wanted = np.zeros(len(placed), dtype=bool)
+        wanted[nearer[away[nearer] < _REACH * edge_m]] = True
+        if not wanted.any():
+            break
+    return creased
+
+
+def _lifted(
+    shape: TrueShape, placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, creased: np.ndarray
+) -> np.ndarray:
+    """Vertices moved along their normals until the triangles around them lie on the shape in the mean."""
+    gap = -shape.distance(placed[touch].mean(axis=1))
+    facing = normals[touch]
+    alike = np.einsum("kcx,kcx->kc", facing, np.roll(facing, 1, axis=1)).min(axis=1) > _ALIKE
+    smooth = alike & ~creased[touch].any(axis=1)
+    total = np.bincount(touch[smooth].ravel(), np.repeat(gap[smooth], 3), len(placed))
+    count = np.bincount(touch[smooth].ravel(), minlength=len(placed))
+    lift = _MEAN_GAP * total / np.maximum(count, 1)
+    return placed + lift[:, None] * normals
+
+
+def _eased(
+    placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, own: np.ndarray, creases: cKDTree
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices `own` beside concave creases moved to the mean of the surface around them, and turned with it.
+
+    In a sharp hollow a tip that is held by friction would snap from one face to the other.
+    """
+    p = placed[touch]
+    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    # the middles of its edges integrate a triangle to second order
+    places = ((p + np.roll(p, -1, axis=1)) / 2).reshape(-1, 3)
+    parts = np.repeat(area / 6, 3, axis=0)
+    size = np.linalg.norm(parts, axis=1)
+    widest = max(_HOLLOW_ROUNDING_M, NORMAL_SMOOTHING_M)
+    near = creases.query(placed[own], distance_upper_bound=3 * widest)[0]
+    own, near = own[np.isfinite(near)], near[np.isfinite(near)]
+    pairs = cKDTree(placed[own]).sparse_distance_matrix(cKDTree(places), 3 * widest, output_type="ndarray")
+    row, column, shape = pairs["i"], pairs["j"], (len(own), len(places))
+    # the far side of a thin wall is no neighbour
+    same = np.einsum("ij,ij->i", normals[own][row], parts[column]) > -0.3 * size[column]
+
+    def mean(values: np.ndarray, width: float) -> np.ndarray:
+        weight = size[column] * same * np.exp(-((pairs["v"] / width) ** 2) / 2)
+        around = sp.csr_matrix((weight, (row, column)), shape=shape)
+        return (around @ values) / np.maximum(np.asarray(around.sum(axis=1)), 1e-300)
+
+    moved, turned = placed.copy(), normals.copy()
+    unit = parts / np.maximum(size, 1e-300)[:, None]
+    agreement = np.linalg.norm(mean(unit, _HOLLOW_ROUNDING_M), axis=1)
+    flat, crease = EASED_AGREEMENT
+    # round faces agree better than that: the mean would draw them inwards
+    share = _smooth_step((flat - agreement) / (flat - crease))[:, None]
+    moved[own] += share * (mean(places, _HOLLOW_ROUNDING_M) - placed[own])
+    facing = mean(unit, NORMAL_SMOOTHING_M)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    turned[own] = _towards(normals[own], facing, _smooth_step(3 - near / NORMAL_SMOOTHING_M))
+    return moved, turned
+
+
+def _towards(normals: np.ndarray, facing: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """(k, 3) unit, turned by a share (k,) of the way from `normals` (k, 3) to `facing` (k, 3)."""
+    turned = normals + share[:, None] * (facing - normals)
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+def _smooth_step(x: np.ndarray) -> np.ndarray:
+    """(k,), 0 below 0 and 1 above 1."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3 - 2 * x)
+
+
+def _mean_normal(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    p = vertices[triangles]
+    total = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]).sum(axis=0)
+    return total / max(float(np.linalg.norm(total)), 1e-300)

@@ -1,0 +1,113 @@
+"""The contact surface drawn to the touched points: where a hand touched is better known than what lies
+between.
+
+A reconstructed surface smooths over the touches (mesh, primitive, hull), by a millimetre at worst; a soft
+object of 300 N/m turns that into 0.3 N at the wrong time. The palpations say where the tip's centre was at
+first touch; their gaps to the surface are spread as a Gaussian process (zero mean, so untouched regions stay
+as modelled) and move the surface along its normals.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mechanics.model.model import Model
+from render.options import RenderOptions
+from render.surface.bvh import STACK, closest_triangle
+from render.surface.contact import outside
+from render.surface.contact_surface import ContactSurface, SurfaceArrays, contact_surface, with_vertices
+from render.surface.walking import place
+
+REACH_M = 0.012  # correlation length of shape errors: about a mesh edge
+DOUBT_M = 1e-3  # their size
+ONSET_NOISE_M = 6e-5  # of a first touch
+LARGEST_M = 4e-3  # a palpation further off than this is no witness of the surface
+
+
+def touched_surface(model: Model, options: RenderOptions) -> ContactSurface:
+    """The model's contact surface: its shape where that is known; else the mesh's, through its palpations'
+    first touches where the options ask for it. Made once for the last model: all its renderers share it."""
+    return _touched_surface(model, options.surface_edge_m, options.snap_to_touches)
+
+
+@lru_cache(maxsize=1)
+def _touched_surface(model: Model, edge_m: float, snap: bool) -> ContactSurface:
+    surface = contact_surface(model.mesh, edge_m=edge_m)
+    if model.mesh.shape is not None or not snap or not len(model.presses):
+        return surface
+    feet, normals, gaps = touch_gaps(surface.arrays, model)
+    if not len(gaps):
+        return surface
+    arrays = surface.arrays
+    covariance = DOUBT_M**2 * _kernel(feet, normals, feet, normals) + ONSET_NOISE_M**2 * np.eye(len(gaps))
+    weights = np.linalg.solve(covariance, gaps)
+    touched = np.unique(arrays.triangles[arrays.free > 0])
+    vertices = arrays.vertices.copy()
+    lift = DOUBT_M**2 * _kernel(vertices[touched], arrays.normals[touched], feet, normals) @ weights
+    vertices[touched] += lift[:, None] * arrays.normals[touched]
+    moved = with_vertices(vertices, arrays.triangles, arrays.neighbours, arrays.free)
+    return dataclasses.replace(surface, arrays=moved)
+
+
+def surface_uncertainty(model: Model, surface: ContactSurface) -> np.ndarray:
+    """(v,) m, standard deviation of the fine vertices along their normals: the model's, less near touches.
+
+    The model's shape uncertainty takes the place of the process's size DOUBT_M (which stands in where the
+    model has none); a first touch is known to ONSET_NOISE_M.
+    """
+    arrays = surface.arrays
+    own = model.shape_uncertainty_m
+    if own is None:
+        sd = np.full(len(arrays.vertices), DOUBT_M)
+    else:
+        sd = np.einsum("vc,vc->v", surface.node_weights, np.asarray(own, dtype=float)[surface.nodes])
+    feet, normals, gaps = touch_gaps(arrays, model)
+    if not len(gaps):
+        return sd
+    at_feet = sd[cKDTree(arrays.vertices).query(feet)[1]]
+    covariance = np.outer(at_feet, at_feet) * _kernel(feet, normals, feet, normals)
+    covariance += ONSET_NOISE_M**2 * np.eye(len(gaps))
+    touched = np.unique(arrays.triangles[arrays.free > 0])
+    shared = at_feet * _kernel(arrays.vertices[touched], arrays.normals[touched], feet, normals)
+    told = np.einsum("vk,kv->v", shared, np.linalg.solve(covariance, shared.T))
+    sd[touched] *= np.sqrt(np.clip(1 - told, 0.0, 1.0))
+    return sd
+
+
+def touch_gaps(arrays: SurfaceArrays, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Feet (k, 3) m, normals (k, 3) and gaps (k,) m of the palpations whose tip met the surface within
+    LARGEST_M.
+
+    A gap is positive where the tip was still off the surface at first touch: there the surface lies further
+    out.
+    """
+    feet, normals, gaps = [], [], []
+    weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
+    point, normal = np.zeros(3), np.zeros(3)
+    radius = model.tool.tip_radius_m
+    for centre in model.presses.point + radius * model.presses.normal:
+        if not np.isfinite(centre).all():
+            continue
+        triangle, distance = closest_triangle(
+            arrays.bvh, arrays.vertices, arrays.triangles, centre, radius + LARGEST_M, weights, stack
+        )
+        if triangle < 0 or arrays.free[triangle] == 0 or not outside(arrays, triangle, weights, centre):
+            continue
+        place(arrays, triangle, weights, point, normal)
+        if abs(distance - radius) < LARGEST_M:
+            feet.append(point.copy())
+            normals.append(normal.copy())
+            gaps.append(distance - radius)
+    return np.array(feet).reshape(-1, 3), np.array(normals).reshape(-1, 3), np.array(gaps)
+
+
+def _kernel(a: np.ndarray, a_normals: np.ndarray, b: np.ndarray, b_normals: np.ndarray) -> np.ndarray:
+    """Correlation of shape errors: near one another and facing alike, so that a rim separates its two
+    sides."""
+    squared = ((a[:, None] - b[None]) ** 2).sum(axis=2)
+    facing = (1 + a_normals @ b_normals.T) / 2
+    return np.exp(-squared / (2 * REACH_M**2)) * facing**4
