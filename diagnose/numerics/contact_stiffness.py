@@ -23,8 +23,8 @@ _TYPICAL = 0.2
 
 
 def layer_factors(share: float) -> tuple[np.ndarray, np.ndarray]:
-    """Factors on a dent's normal force and stick at contact.dent.grid(), where a layer of that B lies on the
-    object."""
+    """Factors on a dent's normal force and stick at `mechanics.contact.dent.grid()`, where a layer of that B
+    lies on the object."""
     x = np.maximum(grid(), 0.5 * grid()[1])
     left = (0.5 * (np.sqrt(share**2 + 4 * x) - share)) ** 2 / x
     return left**1.5, np.sqrt(left)
