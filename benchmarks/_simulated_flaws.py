@@ -16,7 +16,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from mechanics.compliance.sites import touch_sites
-from mechanics.contact.touch import touch_force
+from mechanics.contact.touch import forces_at
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool
 from mechanics.presses.cutting import FoundPresses, cut
@@ -121,10 +121,10 @@ class Block:
             into = press.into + offset(press) + (given.radius_m - RADIUS_M)
             n = self.normals[press.place]
             d = -into[:, None] * n + press.across[:, None] * [0.0, 1.0, 0.0]
-            f = stiffer(press) * touch_force(
-                d, n, sites.far[press.place], young_modulus_pa=given.modulus_pa,
-                poisson_ratio=given.poisson, tip_radius_m=given.radius_m,
-                curvature=sites.curvature[press.place], law=law,
+            own = sites.of(slice(press.place, press.place + 1))
+            f = stiffer(press) * forces_at(
+                own, d, np.array([0, len(d)]), young_modulus_pa=given.modulus_pa,
+                tip_radius_m=given.radius_m, law=law,
             )  # fmt: skip
             if np.isfinite(given.friction):
                 push = f @ n

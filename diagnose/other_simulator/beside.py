@@ -63,7 +63,8 @@ def _of(places: Places, keep: np.ndarray) -> Places:
     """The places of some presses."""
     if keep.all():
         return places
-    cut = {name: getattr(places, name)[keep] for name in ("point", "normal", "frame", "far", "curvature")}
+    own = ("point", "normal", "frame", "far", "curvature", "bracing")
+    cut = {name: getattr(places, name)[keep] for name in own}
     return dataclasses.replace(places, **cut, stages={})
 
 

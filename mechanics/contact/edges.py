@@ -24,7 +24,7 @@ from mechanics.shape.tetmesh import TetMesh
 TURN_POWER = 3
 """Power of a rim's turn, over a right angle, with which it counts: solved for 60 and 90 degrees."""
 _REACH, _STEP = 3.5, 0.5
-"""Widths of a Gaussian beyond which it is left out (0.002); between the samples, of the narrowest."""
+"""Widths of a Gaussian beyond which it is left out (0.002); between its samples."""
 _ON_BASE = 0.12
 """Patch widths from the base within which a crease is the base's outline, no rim."""
 _AT_ONCE = 1000
@@ -61,14 +61,14 @@ def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     and, but for the cosine, on a plane base."""
     widths, over_base, *_ = fitted()
     sigma = widths * usual_width(mesh)
-    middles, area = _base(mesh, _STEP * sigma[over_base].min())
-    samples, length = _rims(mesh, _STEP * sigma[~over_base].min())
-    columns = [
-        _summed(points, middles, area / (2 * np.pi * s**2), s, normals)
-        if of_base
-        else _summed(points, samples, length / (np.sqrt(2 * np.pi) * s), s)
-        for s, of_base in zip(sigma, over_base, strict=True)
-    ]
+    columns = []
+    for s, of_base in zip(sigma, over_base, strict=True):
+        if of_base:
+            middles, area = _base(mesh, _STEP * s)
+            columns.append(_summed(points, middles, area / (2 * np.pi * s**2), s, normals))
+        else:
+            samples, length = _rims(mesh, _STEP * s)
+            columns.append(_summed(points, samples, length / (np.sqrt(2 * np.pi) * s), s))
     return np.stack(columns, axis=1)
 
 

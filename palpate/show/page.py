@@ -223,8 +223,8 @@ def png_and_drawing(picture: Any) -> tuple[bytes, str]:
 
 @contextmanager
 def _laid_out(figure: Figure) -> Iterator[Any]:
-    """The part of a figure that holds anything, inches; inside, saving does not lay it out anew, which takes as
-    long as drawing."""
+    """The part of a figure that holds anything, inches; inside, saving it does not lay it out anew, which
+    takes as long as drawing."""
     from matplotlib import rcParams
 
     figure.draw_without_rendering()

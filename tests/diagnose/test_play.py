@@ -63,8 +63,7 @@ def test_a_play_beside_tremor_is_one_name(bench):
 
 def test_a_memory_beside_a_play_that_the_support_showed_is_one_name_more(bench):
     rigid = Rigid(0.0, 1e-6, 1e-6, 10.0, play=-WIDTH, play_error=1e-6)
-    plain, model = bench.record()
-    known = seen_play(build_forward(touches_of(bench.table(plain)), model), rigid, set())
+    known = seen_play(rigid, set())
     found = answer(bench, lambda t, x, f: (followed(x), relaxed(t, f)), known)
     assert set(found.chosen) == {"backlash", "viscoelasticity"}
 

@@ -10,8 +10,10 @@ import pytest
 from diagnose.numerics.base import Signal, signal_of
 from diagnose.numerics.registry import NAMES, numericals
 from diagnose.options import DiagnoseOptions
+from diagnose.other_simulator.advice import parameter_words
 from diagnose.other_simulator.against_law import seen_in_samples
 from diagnose.other_simulator.forces import Forces, ForcesOptions, aligned, read_forces, sorted_forces
+from diagnose.other_simulator.parts import Parameter
 from diagnose.other_simulator.pipeline import Asked, diagnose_simulated
 from diagnose.other_simulator.presses_to_run import spread_out
 from diagnose.other_simulator.result import PARTS, Mended
@@ -83,6 +85,25 @@ def test_what_changes_the_force_most_is_named_first_whatever_part_it_is_in(world
     assert set(result.effects) == {"time_step", "stated_modulus"}
     sizes = {e.name: e.gap_after_n for e in result.entries}
     assert sizes[result.effects[0]] < sizes[result.effects[1]]
+
+
+def test_what_is_named_first_does_not_depend_on_what_stands_beside_it(world):
+    """A mesh too stiff by 0.7 outweighs a modulus too small by 0.55, though in a simulation that has both the
+    mesh adds but 0.7 of 0.45."""
+    force, modulus = 1.7 * 0.45 * world[3], world[1].material.young_modulus_pa
+    result = judged(world, force, modulus=0.45 * modulus)
+    assert result.effects == ("mesh_stiffness", "stated_modulus")
+
+
+def test_a_poisson_ratio_is_advised_as_far_as_a_simulator_takes_it():
+    wrong = Parameter("stated_poisson_ratio", np.zeros((1, 3)), 0.35, 0.49)
+    assert parameter_words(wrong) == "give it 0.49 for Poisson's ratio (it had 0.35)"
+    most = "give it 0.45 for Poisson's ratio, the most that it takes (the recording says 0.49)"
+    assert parameter_words(wrong, 0.45) == most
+    there = dataclasses.replace(wrong, stated=0.45)
+    assert parameter_words(there, 0.45).endswith("0.45 is the most that it takes: this part stays")
+    tip = Parameter("stated_tip_radius", np.zeros((1, 3)), 0.005, 0.006)
+    assert parameter_words(tip, 0.45) == "give it 0.006 m for the tip's radius (it had 0.005 m)"
 
 
 def test_two_flaws_are_named_by_a_quick_diagnosis_too(world):

@@ -234,8 +234,8 @@ def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
 
 
 def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_walls():
+    from reconstruct.shapes.choice import direction_score, try_shapes
     from reconstruct.shapes.prism import Prism
-    from reconstruct.steps.s4_surface.shape_choice import direction_score, try_shapes
 
     truth = phantom_truth("bowl")
     evidence, _ = touch(truth, 0)
@@ -248,7 +248,7 @@ def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_wa
 
 def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeypatch):
     """A field beside a block once ended 1.8 m below the support."""
-    from reconstruct.steps.s4_surface import shape_choice as module
+    from reconstruct.steps.s4_surface import surface as module
 
     evidence, _ = touch(phantom_truth("cylinder"), 0)
     honest, tried = module.draw, []

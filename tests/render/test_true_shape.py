@@ -11,7 +11,7 @@ from mechanics.model.files import read_model, write_model
 from mechanics.shape.nearest import neighbours, sample
 from mechanics.shape.tetmesh import TetMesh
 from mechanics.shape.true_shape import TrueShape
-from render.fem.field import far_field
+from render.fem.renderer import far_field
 from render.surface.contact_surface import contact_surface
 
 from . import shapes
