@@ -267,7 +267,7 @@ def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeyp
 
 def test_an_implicit_surface_that_is_open_is_no_rival(monkeypatch):
     """It was tried where no shape explains the touches, and its fault refused the recording."""
-    from reconstruct.shapes import choice as module
+    from reconstruct.steps.s4_surface import surface as module
 
     asked = []
 
