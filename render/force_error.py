@@ -21,7 +21,7 @@ from render.surface.snapping import ONSET_NOISE_M
 FLOOR, BENT_SHARE, SIDEWAYS_SHARE = 0.02, 0.03, 0.03
 RIM_SHARE, BASE_SHARE = 0.2, 0.3
 """By 288 forces at 32 places of four shapes (`bench law-by-place`, seeds 15 and 16) under bracing at rims and
-base: 1 % lie beyond, all on fillets and within 2 mm of a rim. Shallow touches within 1 mm of a rim are up to
+base: 1 % lie beyond, all on a fillet. Shallow touches within 1 mm of a rim are up to
 24 % too hard, by our own solved presses."""
 _SURE = 1.96
 _STEEPNESS = 1.4
