@@ -56,7 +56,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pairs", type=int, default=12, help="cases with two")
     parser.add_argument("--controls", type=int, default=12, help="cases with none")
     parser.add_argument(
-        "--adapter", choices=CONTROLS, help="plant them in this simulator instead of in our own law's forces"
+        "--adapter",
+        nargs="+",
+        choices=CONTROLS,
+        help="plant them in these simulators instead of in our own law's forces",
     )
     parser.add_argument("--seed", type=int, default=0, help="of all that is drawn")
     parser.add_argument(
@@ -108,7 +111,8 @@ class _Case:
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Plant, seal, judge, open; print what was found."""
     if arguments.adapter is not None:
-        return _run_adapter(arguments)
+        said = [_run_adapter(adapter, arguments) for adapter in arguments.adapter]
+        return {key: [each for one in said for each in one[key]] for key in ("figures", "cases")}
     block = Block()
     world = cache(lambda late: _world(block, late))
     drawn = np.random.default_rng(arguments.seed)
@@ -128,9 +132,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     return _said(list(rows.values()))
 
 
-def _run_adapter(arguments: argparse.Namespace) -> dict[str, Any]:
+def _run_adapter(adapter: str, arguments: argparse.Namespace) -> dict[str, Any]:
     """The same with flaws planted in a simulator (`_adapter_flaws`), whose control comes first."""
-    adapter, work = arguments.adapter, arguments.work
+    work = arguments.work
     runs = Runs(None if work is None else work / "runs")
     rng = np.random.default_rng(arguments.seed)
     plan = drawn_plan(adapter, rng, arguments.singles, arguments.pairs)

@@ -94,7 +94,7 @@ def diagnose(
     seen = read_sideways(rigid, rules) & frozenset(e.name for e in tried)
     if rigid is not None and seen:
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
-    known = seen_play(forward, rigid, excluded, rules)
+    known = seen_play(rigid, excluded, rules)
     if rigid is not None and known is not None:
         seen |= {known.name}
         tried = [known if e.name == known.name else e for e in tried]

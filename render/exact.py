@@ -35,8 +35,10 @@ from render.force_error import force_errors
 
 DEPTHS = 6
 """At which a place is solved, evenly to the deepest."""
-CPU_S = 14.0
+CPU_S = 10.0
 """A place's on one core of 2025: what is said beforehand."""
+MOST_RADII = 2.0
+"""Tip radii to which a place is solved; what is deeper, or no press at all, takes the factor from there."""
 UNSOLVED = (ADHESION.name, JKR.name, SKIN.name, YIELDING_BASE.name, UNBONDED.name)
 """Effects of a model that the solver of a press does not know."""
 _LEAST = 1e-4
@@ -90,6 +92,12 @@ def press_options(renderer: FemRenderer) -> PressOptions:
     return PressOptions(law=law, stiffening=stiffening, coupled=law != "linear", friction=friction)
 
 
+def check_renderer(name: str) -> None:
+    """Raise OptionError for a renderer whose law no press is solved beside."""
+    if name != FemRenderer.name:
+        raise OptionError(f"--exact solves presses beside the law of '{FemRenderer.name}', not of '{name}'")
+
+
 class ExactPlaces:
     """Solves places of one renderer's model with one tip. Raises OptionError (`press_options`), and for a
     renderer that is not the finite-element one."""
@@ -97,8 +105,8 @@ class ExactPlaces:
     def __init__(
         self, renderer: Renderer, tip_radius_m: float | None = None, options: PressOptions | None = None
     ) -> None:
-        if not isinstance(renderer, FemRenderer):
-            raise OptionError(f"presses are solved beside the law of 'fem', not of '{renderer.name}'")
+        check_renderer(renderer.name)
+        assert isinstance(renderer, FemRenderer)
         model, touch = renderer.model, rendered_touch(renderer.model, renderer.options)
         self.renderer, self.tip_m = renderer, float(tip_radius_m or model.tool.tip_radius_m)
         self.options = options or press_options(renderer)
@@ -119,7 +127,7 @@ class ExactPlaces:
     def __call__(self, point: np.ndarray, normal: np.ndarray, deepest_m: float) -> SolvedPlace | None:
         """The place at `point` (3,) m with its outward normal (3,), pressed to `deepest_m`; None where the
         solver finds no equilibrium or the law gives no force."""
-        depths = deepest_m * np.linspace(0.0, 1.0, DEPTHS + 1)[1:]
+        depths = min(deepest_m, MOST_RADII * self._radius) * np.linspace(0.0, 1.0, DEPTHS + 1)[1:]
         key = content_key(*self._content, np.asarray(point), np.asarray(normal), depths)
         path = cache_folder() / "presses" / f"{key[:24]}.bin"
         made = load_or_build(path, key, lambda: {"force": self._solver.press(point, normal, depths).force})

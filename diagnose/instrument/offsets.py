@@ -23,6 +23,8 @@ from mechanics.effects.surface_offset import EFFECT as OFFSET
 from mechanics.effects.tool_compliance import EFFECT as SPRING
 
 RULES = AttributionOptions()
+LEAST_PLAY_M = 5e-5
+"""A narrower play on the support may be what rounding makes of it."""
 PLAY_GIVES = 0.05
 """Share by which a play's width may be another than the support shows."""
 
@@ -63,7 +65,9 @@ def ruled_out(
             gone.add(SPRING.name)
     if rigid is not None and np.isfinite(rigid.play_error):
         most = abs(rigid.play) + rules.z * rigid.play_error
-        if not any(matters(forward, _played(forward, width), rules) for width in (-most, most)):
+        if not _shows_play(rigid, rules) and not any(
+            matters(forward, _played(forward, width), rules) for width in (-most, most)
+        ):
             gone.add(PLAY.name)
     if move is not None:
         t = forward.touches
@@ -129,14 +133,14 @@ def with_move(
     return offsets.also(OFFSET.name, parameters, intervals, change, why)
 
 
-def seen_play(
-    forward: Forward, rigid: Rigid | None, excluded: set[str], rules: AttributionOptions = RULES
-) -> Effect | None:
-    """A play that the support shows and that matters to the presses, its width held to what was read there:
-    a free one would widen until it took a solid's memory in; else None."""
-    if rigid is None or PLAY.name in excluded or abs(rigid.play) <= rules.z * rigid.play_error:
-        return None
-    if not matters(forward, _played(forward, rigid.play), rules):
+def _shows_play(rigid: Rigid, rules: AttributionOptions) -> bool:
+    return abs(rigid.play) > max(rules.z * rigid.play_error, LEAST_PLAY_M)
+
+
+def seen_play(rigid: Rigid | None, excluded: set[str], rules: AttributionOptions = RULES) -> Effect | None:
+    """A play that the support shows, its width held to what was read there: a free one would widen until it
+    took a solid's memory in; else None."""
+    if rigid is None or PLAY.name in excluded or not _shows_play(rigid, rules):
         return None
     give = float(np.hypot(PLAY_GIVES * rigid.play, rules.z * rigid.play_error))
     known = dataclasses.replace(

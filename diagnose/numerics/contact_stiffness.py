@@ -1,27 +1,67 @@
-"""Contact stiffness: the tip sinks into the surface on a spring that the object does not have (penalty)."""
+"""Contact stiffness: the tip sinks into the surface on springs that the object does not have (penalty).
+
+One spring in series sinks with the force. Springs side by side, one a node or an area, are the more the
+larger the contact is: a layer of stiffness s an area sinks by F / (s pi R d) where a dent d gives
+F = 4/3 E* sqrt(R) d^1.5, so it takes B sqrt(R d) of the depth, B = 4 E* / (3 pi s R), which is most of it
+where the press is light.
+"""
+
+from typing import Any
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.contact.dent import grid
 from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 
+_TYPICAL = 0.2
+"""Of the tip's radius: the dent at which the layer's stiffness is told as one spring's."""
+
+
+def layer_factors(share: float) -> tuple[np.ndarray, np.ndarray]:
+    """Factors on a dent's normal force and stick at `mechanics.contact.dent.grid()`, where a layer of that B
+    lies on the object."""
+    x = np.maximum(grid(), 0.5 * grid()[1])
+    left = (0.5 * (np.sqrt(share**2 + 4 * x) - share)) ** 2 / x
+    return left**1.5, np.sqrt(left)
+
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.tool_compliance += values[0]
+    if values[1] > 0:
+        settings.touch.factors.append(lambda poisson_ratio: layer_factors(values[1]))
+
+
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+    assert isinstance(scene, Forward), "numerical effects act on the presses of a diagnosis"
+    radius, plane = scene.tip_radius, modulus_pa / (1 - scene.ideal(modulus_pa).nu ** 2)
+    # of the layer: F / (s pi R d) over F
+    layer = 0.75 * values[1] / (plane * radius * _TYPICAL)
+    return {
+        "stiffness_n_per_m": float(1 / max(values[0] + layer, 1e-9)),
+        "layer_n_per_m3": float(4 * plane / (3 * np.pi * radius * max(values[1], 1e-6))),
+    }
 
 
 EFFECT = NumericalEffect(
     name="contact_stiffness",
     domain=DOMAIN,
     scope=Scope.EVERYWHERE,
-    words="the contact gives: a spring in series that the object does not have",
+    words="the contact gives: springs in series that the object does not have",
     plain_words="the simulated tip sinks into the surface before it is pushed back, as if on a spring",
-    parameters=(Parameter("compliance_m_per_n", "m/N", 0.0, 0.05, 0.0, (2e-4, 1e-3), 2e-5),),
-    keys={"stiffness_n_per_m": Key(low=1.0, high=1e12, unit="N/m", required=True)},
-    report=lambda values, scene, modulus_pa: {"stiffness_n_per_m": float(1 / np.maximum(values[0], 1e-9))},
+    parameters=(
+        Parameter("compliance_m_per_n", "m/N", 0.0, 0.05, 0.0, (2e-4, 1e-3, 0.0, 0.0), 2e-5),
+        Parameter("layer", "1", 0.0, 2.0, 0.0, (0.0, 0.0, 0.05, 0.3), 0.005),
+    ),
+    keys={
+        "stiffness_n_per_m": Key(low=1.0, high=1e12, unit="N/m", required=True),
+        "layer_n_per_m3": Key(low=1.0, high=1e15, unit="N/m^3"),
+    },
+    report=_report,
     change=_change,
     advice="raise the contact stiffness (a penalty of ten times the object's own stiffness under the tip "
     "leaves a tenth), or lower the time constant of the contact",

@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnose.numerics.registry import NAMES, numerical
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from diagnose.other_simulator.advice import advice_of
 from diagnose.other_simulator.against_law import Numerics
 from diagnose.other_simulator.beside import Sides, beside, named_numerics
 from diagnose.other_simulator.forces import Forces, ForcesOptions, aligned
@@ -193,7 +194,10 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         ),
         entries=_entries(w, names),
         young_modulus_pa=reality.young_modulus_pa,
-        advice=_advice(w),
+        advice=advice_of(
+            numerics, w.wrong, w.real.names, w.asked.advice,
+            unstated=bool(_unstated(w.asked.stated, numerics)), poisson_limit=w.asked.poisson_limit,
+        ),
         notes=(*w.sides.notes, *_defaults(w.asked.stated)),
         reasons=tuple(answer.reasons),
         reality=reality,
@@ -274,36 +278,3 @@ def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _advice(w: _Weighed) -> tuple[str, ...]:
-    said = []
-    for name in (*w.numerics.named, *w.numerics.candidates):
-        words = w.asked.advice.get(name) or numerical(name).advice
-        which = "" if name in w.numerics.named else "or "
-        said.append(f"{which}{name.replace('_', ' ')}: {words}")
-    units = {
-        "stated_modulus": ("Young's modulus", "Pa"),
-        "stated_poisson_ratio": ("Poisson's ratio", ""),
-        "stated_friction": ("friction", ""),
-        "stated_tip_radius": ("the tip's radius", "m"),
-    }
-    if _unstated(w.asked.stated, w.numerics):
-        said.append("or stated modulus: nobody said what it was given; say it: --stated young_modulus_pa=PA")
-    for p in w.wrong:
-        what, unit = units[p.name]
-        now = f"{p.measured:.4g} {unit}".strip() if math.isfinite(p.measured) else "infinite: the tip sticks"
-        limit = w.asked.poisson_limit if p.name == "stated_poisson_ratio" else math.inf
-        if p.measured <= limit or not math.isfinite(p.measured):
-            words = f"give it {now} for {what} (it had {p.stated:.4g} {unit})"
-        elif p.stated < limit:
-            words = f"give it {limit:g} for {what}, the most that it takes (the recording says {now})"
-        else:
-            words = f"the recording says {now}, and {limit:g} is the most that it takes: this part stays"
-        said.append(f"{p.name.replace('_', ' ')}: {words}")
-    for name in w.real.names:
-        said.append(
-            f"{name.replace('_', ' ')}: no setting of an ideal elastic simulation has it; "
-            "'palpate diagnose REC --apply MODEL2' writes a model that does"
-        )
-    return tuple(said)

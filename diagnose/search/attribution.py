@@ -18,6 +18,10 @@ from diagnose.search.rivals import confidence_set_p, of_one_phenomenon, rivals_o
 from mechanics.effects.base import Effect, Scope
 from mechanics.progress import Progress, silent
 
+SHOWN, MOST_SHOWN = 10.0, 4
+"""Gain in log likelihood from which an effect on a simulator's force is there, if not alone; of how many such
+effects pairs are tried."""
+
 
 @dataclass(frozen=True)
 class Attribution:
@@ -90,7 +94,9 @@ def attribute(
         known = [scores[n] for n in sorted(seen) if n in scores]
         passing = [s for s in known if s.size_n > search.smallest_n] or passing
         if not passing:
-            pair = None if step + 2 > search.options.greatest_number else _paired(search, effects, current)
+            pair = None
+            if step + 2 <= search.options.greatest_number:
+                pair = _paired(search, _able_together(search, effects, current, scores), current)
             if pair is None:
                 break
             chosen += [n for n in pair.found.names if n not in current.found.names]
@@ -160,13 +166,23 @@ def _with_hidden_strain(
     return both if both.found.loss < candidate.found.loss else candidate
 
 
-def _paired(search: Search, effects: Sequence[Effect], current: Candidate) -> Candidate | None:
-    """Two effects in time that close the gap only together: memory and delay bend loops opposite ways."""
+def _able_together(
+    search: Search, effects: Sequence[Effect], current: Candidate, scores: dict[str, Score]
+) -> list[Effect]:
+    """What may close a gap two at a time where none does alone: effects in time, as memory and delay bend
+    loops opposite ways; of a simulator's force, which no noise hides, whatever the places show."""
+    if not search.forward.measured:
+        shown = sorted((s for s in scores.values() if s.gain > SHOWN), key=lambda s: -s.gain)
+        return [s.effect for s in shown[:MOST_SHOWN]]
     if current.chi < search.options.unknown_chi:
-        return None
+        return []
     able = [e for e in effects if e.scope is Scope.TIME and e.name not in current.found.names]
     # of the laws of one phenomenon the first stands for all
-    able = list({e.hints.phenomenon or e.name: e for e in reversed(able)}.values())
+    return list({e.hints.phenomenon or e.name: e for e in reversed(able)}.values())
+
+
+def _paired(search: Search, able: Sequence[Effect], current: Candidate) -> Candidate | None:
+    """Two effects that close the gap only together."""
     found = []
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)

@@ -150,6 +150,8 @@ class PressSolver:
         across_faces = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         reach = far(corner.mean(axis=1)) < options.reach * last + 0.1 * tip
         faces = mesh.faces[reach & (across_faces @ normal > 0)]
+        if not len(faces):
+            raise OptionError(f"no element's face lies within the contact: finest is {options.finest:g}")
         near = np.zeros(len(mesh.cells), dtype=bool)
         if options.law != "linear":
             near = far(mesh.points[mesh.cells[:, :4]].mean(axis=1)) < options.zone * last

@@ -115,12 +115,14 @@ def press(asked: PressOperands, call: Call) -> Curve:
     """
     import numpy as np
 
-    from render.exact import ExactPlaces, said_beforehand
+    from render.exact import ExactPlaces, check_renderer, said_beforehand
     from render.press import Stroke, read_curve, solved
     from render.press import press as pressed
 
     if asked.expect:
         read_curve(asked.expect)  # before the work
+    if asked.exact:
+        check_renderer(asked.renderer)
     make = touched_scene(given_model(asked.model, call, "a"), asked.renderer, call)
     with call.progress("press") as tell:
         scene = make(tell)

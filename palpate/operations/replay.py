@@ -51,9 +51,17 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     """
     from reconstruct.presses_on_model import check_near
     from reconstruct.steps.s3_contacts.quasi_static import is_points
-    from render.exact import ExactPlaces, deepest_of_sites, exact_replay, said_beforehand
+    from render.exact import (
+        ExactPlaces,
+        check_renderer,
+        deepest_of_sites,
+        exact_replay,
+        said_beforehand,
+    )
     from render.replay import ReplayResult, replay_error, replay_recording
 
+    if asked.exact:
+        check_renderer(asked.renderer)
     make = touched_scene(asked.model, asked.renderer, call)
     measured = read_recording(asked.recording)
     if is_points(measured):

@@ -10,7 +10,8 @@ import io
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -34,6 +35,7 @@ _PHONE_PX = 400
 """Across a phone: a legible picture that is wider says that a tap shows it large."""
 _MOST_COLUMNS = 3
 """Of a table that a phone shows side by side; in wider ones each row becomes a list."""
+_DPI = 110
 _MOST_SVG, _MOST_PARTS = 400_000, 3000
 """Bytes of a packed drawing that a page carries, and its dots and faces; a picture of more stays a PNG."""
 
@@ -47,7 +49,7 @@ class Page:
         self._live = False
         self._terms = Terms()
         self._result = ""
-        self._drawn: list[tuple[Any, bytes]] = []
+        self._drawn: list[tuple[Any, bytes, str]] = []
 
     def heading(self, text: str) -> None:
         """A section's heading."""
@@ -140,7 +142,7 @@ class Page:
         """Write each picture as `folder/NAME.png`, drawn once for the page as well; returns the paths."""
         paths = {}
         for name, picture in figures.items():
-            data = self._png(picture)
+            data, _ = self._once(picture)
             paths[name] = Path(folder) / f"{name}.png"
             with atomic_file(paths[name], PNG) as temporary:
                 temporary.write_bytes(data)
@@ -163,23 +165,24 @@ class Page:
     def _words(self, text: str) -> str:
         return self._terms.linked(_words(text))
 
-    def _png(self, picture: Any) -> bytes:
-        """A picture's PNG, drawn once."""
-        found = next((data for each, data in self._drawn if each is picture), None)
-        if found is None:
-            found = png_bytes(picture)
-            self._drawn.append((picture, found))
-        return found
+    def _once(self, picture: Any) -> tuple[bytes, str]:
+        """A picture's PNG and its packed drawing, made once."""
+        for each, *found in self._drawn:
+            if each is picture:
+                return found[0], found[1]
+        made = png_and_drawing(picture)
+        self._drawn.append((picture, *made))
+        return made
 
     def _figure(self, picture: Any, caption: str) -> str:
-        data, said = self._png(picture), html.escape(caption)
+        (data, packed), said = self._once(picture), html.escape(caption)
         drawn = (
             f'<img alt="{said}" style="--legible:{_LEGIBLE * _width(data):.0f}px" '
             f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
         )
         words = f"<figcaption>{self._terms.linked(said)}</figcaption>"
         wide = ' class="wide"' if _LEGIBLE * _width(data) > _PHONE_PX else ""
-        return f"<figure{wide}>{scrolling(drawn)}{words}{_svg(picture)}</figure>"
+        return f"<figure{wide}>{scrolling(drawn)}{words}{packed}</figure>"
 
 
 def scrolling(wide: str) -> str:
@@ -210,15 +213,44 @@ def file_words(path: str | Path | None, otherwise: str) -> str:
     return min(str(path), os.path.relpath(path), key=len)
 
 
-def _svg(picture: Any) -> str:
-    """A matplotlib figure as a packed drawing, for `page.js` to unpack; '' for other pictures."""
-    if not hasattr(picture, "savefig") or _parts(picture) > _MOST_PARTS:
+def png_and_drawing(picture: Any) -> tuple[bytes, str]:
+    """PNG data of a picture, and its packed drawing if it has one."""
+    if not hasattr(picture, "savefig"):
+        return png_bytes(picture), ""
+    with _laid_out(picture) as box:
+        return _png(picture, box), _svg(picture, box)
+
+
+@contextmanager
+def _laid_out(figure: Figure) -> Iterator[Any]:
+    """The part of a figure that holds anything, inches; inside, saving it does not lay it out anew, which
+    takes as long as drawing."""
+    from matplotlib import rcParams
+
+    figure.draw_without_rendering()
+    engine = figure.get_layout_engine()
+    figure.set_layout_engine(None)
+    try:
+        yield figure.get_tightbbox().padded(rcParams["savefig.pad_inches"])
+    finally:
+        figure.set_layout_engine(engine)
+
+
+def _png(figure: Figure, box: Any = "tight") -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=_DPI, bbox_inches=box)
+    return buffer.getvalue()
+
+
+def _svg(picture: Figure, box: Any) -> str:
+    """A matplotlib figure as a packed drawing, for `page.js` to unpack; '' where it would be large."""
+    if _parts(picture) > _MOST_PARTS:
         return ""
     from matplotlib import rc_context
 
     buffer = io.BytesIO()
     with rc_context({"svg.hashsalt": "palpate", "svg.fonttype": "none"}):
-        picture.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None})
+        picture.savefig(buffer, format="svg", bbox_inches=box, metadata={"Date": None})
     packed = base64.b64encode(gzip.compress(buffer.getvalue(), mtime=0)).decode()
     return f'<script type="text/plain" class="svg">{packed}</script>' if len(packed) < _MOST_SVG else ""
 
@@ -254,13 +286,12 @@ def png_bytes(picture: Any) -> bytes:
     if isinstance(picture, str | Path):
         with reading(picture):
             return Path(picture).read_bytes()
-    buffer = io.BytesIO()
     if hasattr(picture, "savefig"):
-        picture.savefig(buffer, format="png", dpi=110, bbox_inches="tight")
-    else:
-        from matplotlib.image import imsave
+        return _png(picture)
+    from matplotlib.image import imsave
 
-        imsave(buffer, picture, format="png")
+    buffer = io.BytesIO()
+    imsave(buffer, picture, format="png")
     return buffer.getvalue()
 
 

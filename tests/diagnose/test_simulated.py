@@ -10,8 +10,10 @@ import pytest
 from diagnose.numerics.base import Signal, signal_of
 from diagnose.numerics.registry import NAMES, numericals
 from diagnose.options import DiagnoseOptions
+from diagnose.other_simulator.advice import parameter_words
 from diagnose.other_simulator.against_law import seen_in_samples
 from diagnose.other_simulator.forces import Forces, ForcesOptions, aligned, read_forces, sorted_forces
+from diagnose.other_simulator.parts import Parameter
 from diagnose.other_simulator.pipeline import Asked, diagnose_simulated
 from diagnose.other_simulator.presses_to_run import spread_out
 from diagnose.other_simulator.result import PARTS, Mended
@@ -34,17 +36,21 @@ OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
 
 @pytest.fixture(scope="module")
 def world(bench):
-    """(recording, model, its diagnosis, the law's own force without noise)."""
+    """(recording, model, its diagnosis, the law's own force without noise, answers that were given)."""
     recording, model = bench.record(law="linear")
     exact = {}
     bench.record(lambda t, x, f: exact.update(force=f.copy()) or (x, f), law="linear")
-    return recording, model, diagnose(recording, model, FAST), exact["force"]
+    return recording, model, diagnose(recording, model, FAST), exact["force"], {}
 
 
 def judged(world, force, **stated):
-    recording, model, reality, _ = world
-    asked = Asked(Forces(recording.t, force, "a simulator"), stated_of(stated, model), OWN_CLOCK)
-    return diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    """The answer to a force; tests that ask the same share it."""
+    recording, model, reality, _, answers = world
+    key = force.tobytes(), *stated.items()
+    if key not in answers:
+        asked = Asked(Forces(recording.t, force, "a simulator"), stated_of(stated, model), OWN_CLOCK)
+        answers[key] = diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    return answers[key]
 
 
 def shares(result):
@@ -79,6 +85,25 @@ def test_what_changes_the_force_most_is_named_first_whatever_part_it_is_in(world
     assert set(result.effects) == {"time_step", "stated_modulus"}
     sizes = {e.name: e.gap_after_n for e in result.entries}
     assert sizes[result.effects[0]] < sizes[result.effects[1]]
+
+
+def test_what_is_named_first_does_not_depend_on_what_stands_beside_it(world):
+    """A mesh too stiff by 0.7 outweighs a modulus too small by 0.55, though in a simulation that has both the
+    mesh adds but 0.7 of 0.45."""
+    force, modulus = 1.7 * 0.45 * world[3], world[1].material.young_modulus_pa
+    result = judged(world, force, modulus=0.45 * modulus)
+    assert result.effects == ("mesh_stiffness", "stated_modulus")
+
+
+def test_a_poisson_ratio_is_advised_as_far_as_a_simulator_takes_it():
+    wrong = Parameter("stated_poisson_ratio", np.zeros((1, 3)), 0.35, 0.49)
+    assert parameter_words(wrong) == "give it 0.49 for Poisson's ratio (it had 0.35)"
+    most = "give it 0.45 for Poisson's ratio, the most that it takes (the recording says 0.49)"
+    assert parameter_words(wrong, 0.45) == most
+    there = dataclasses.replace(wrong, stated=0.45)
+    assert parameter_words(there, 0.45).endswith("0.45 is the most that it takes: this part stays")
+    tip = Parameter("stated_tip_radius", np.zeros((1, 3)), 0.005, 0.006)
+    assert parameter_words(tip, 0.45) == "give it 0.006 m for the tip's radius (it had 0.005 m)"
 
 
 def test_two_flaws_are_named_by_a_quick_diagnosis_too(world):
@@ -217,7 +242,7 @@ def test_mujoco_as_documented_lets_a_deep_press_through(tmp_path, monkeypatch):
 
 
 def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):
-    recording, model, _, force = world
+    recording, model, _, force, _ = world
     presses, t = model.presses, recording.t
     with pytest.raises(OptionError, match="--simulated-force-on object"):
         aligned(Forces(t, -force, "x"), presses, ForcesOptions())
@@ -232,7 +257,7 @@ def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):
 
 
 def test_missing_rows_and_another_rate_are_told(world):
-    recording, model, _, force = world
+    recording, model, _, force, _ = world
     presses, t = model.presses, recording.t
     kept = ~((t > presses.onset_s[2]) & (t < presses.onset_s[2] + 0.3))
     some = aligned(Forces(t[kept][::4], force[kept][::4], "x"), presses, OWN_CLOCK)
@@ -245,7 +270,7 @@ def test_missing_rows_and_another_rate_are_told(world):
 
 
 def test_a_press_without_rows_is_left_out_of_the_answer(world):
-    recording, model, reality, force = world
+    recording, model, reality, force, _ = world
     t, onset = recording.t, model.presses.onset_s[2]
     kept = ~((t > onset) & (t < onset + 0.3))
     asked = Asked(Forces(t[kept], 1.5 * force[kept], "x"), stated_of({}, model), OWN_CLOCK)
@@ -256,7 +281,7 @@ def test_a_press_without_rows_is_left_out_of_the_answer(world):
 
 def test_a_simulator_that_was_run_over_some_presses_is_judged_by_these_alone(world):
     """What it was not run over is zero there, which is no contact that was lost."""
-    recording, model, reality, force = world
+    recording, model, reality, force, _ = world
     presses, t = model.presses, recording.t
     chosen = spread_out(presses, 8)
     assert chosen.sum() == 8 and not (chosen & ~spread_out(presses, 12)).any()  # fewer are some of more
