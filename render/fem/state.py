@@ -17,7 +17,7 @@ from render.surface.contact_surface import SurfaceArrays
 class FemParameters(NamedTuple):
     """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
 
-    far: (v, 3, 3) 1/m. curvature: (v,) 1/m, mean of the principal ones. bracing: (v,) 1/m (render.fem.field).
+    far: (v, 3, 3) 1/m. curvature: (v,) 1/m, mean of the principal ones. bracing: (v,) 1/m (render.fem.renderer).
     softness: (v,) of the material under a tip, 1 where its modulus is the global one. parents: (k, 3)
     compliance nodes that interpolate over a triangle, -1 where fixed; parent_weights (k, 3, 3). blocks:
     (n, n, 3, 3) 1/m, or of no size and factor: (n, 3, r) in their place, see SurfaceCompliance. table: dent
