@@ -8,6 +8,7 @@ Tested against emulators built from published protocols; no hardware tried.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +19,6 @@ from devices.codecs import pid
 from devices.codecs.pid import PidLayout
 from devices.hid_port import HidPort, enumerate_devices, load, opened, permitted
 from devices.io_thread import ForcefulDevice, Reading
-from devices.velocity import VelocityEstimate
 from mechanics.errors import DeviceError
 from mechanics.options import check_ranges, option
 
@@ -40,6 +40,7 @@ RESTART_S = 0.02
 QUIET_S = 0.01
 DIRECTION_DEGREES = {"x": 90.0, "y": 180.0}
 _JOYSTICK_USAGES = ((1, 4), (1, 5), (1, 8), (2, 2))
+LONGEST_GAP_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -222,3 +223,30 @@ def _look(entry: dict[str, Any], options: PidOptions, hid: Any) -> Availability:
         return replace(there, why_not=str(error), remedy="choose a device with force feedback")
     spec = PidWire(options, host_clock, hid).spec
     return replace(there, spec=replace(spec, title=there.spec.title, actuated_axes=axes, sensed_axes=axes))
+
+
+class VelocityEstimate:
+    """First-order low pass of `time_constant_s` over differences; a long gap starts it anew."""
+
+    def __init__(self, time_constant_s: float = 0.008) -> None:
+        self.time_constant_s = time_constant_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything: the next velocity is zero."""
+        self._position: np.ndarray | None = None
+        self._time_s = 0.0
+        self._velocity = np.zeros(3)
+
+    def update(self, time_s: float, position_m: np.ndarray) -> np.ndarray:
+        """(3,) m/s after this position."""
+        duration = time_s - self._time_s
+        if self._position is None or duration > LONGEST_GAP_S:
+            self._velocity = np.zeros(3)
+        elif duration <= 0:
+            return self._velocity
+        else:
+            keep = math.exp(-duration / self.time_constant_s)
+            self._velocity = keep * self._velocity + (1 - keep) * (position_m - self._position) / duration
+        self._position, self._time_s = position_m, time_s
+        return self._velocity

@@ -21,6 +21,7 @@ from mechanics.progress import Clock, Progress, part, silent
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from mechanics.recording.recording import Recording, base_model_of
 from mechanics.result import Result
+from reconstruct.background_mesher import BackgroundMesher
 from reconstruct.checks.finding import Finding
 from reconstruct.checks.outcome import outcome_of
 from reconstruct.checks.registry import Checkup
@@ -37,7 +38,6 @@ from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
 from reconstruct.steps.s3_contacts.straightened import laid
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
-from reconstruct.steps.s5_mesh.background import BackgroundMesher
 from reconstruct.steps.s5_mesh.meshing import Meshing, uncertainty_at
 from reconstruct.steps.s6_one_d.one_d import OneD, columns, profiles
 from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out, told_by_others

@@ -37,6 +37,8 @@ DEPTHS = 6
 """At which a place is solved, evenly to the deepest."""
 CPU_S = 10.0
 """A place's on one core of 2025: what is said beforehand."""
+MOST_RADII = 2.0
+"""Tip radii to which a place is solved; what is deeper, or no press at all, takes the factor from there."""
 UNSOLVED = (ADHESION.name, JKR.name, SKIN.name, YIELDING_BASE.name, UNBONDED.name)
 """Effects of a model that the solver of a press does not know."""
 _LEAST = 1e-4
@@ -125,7 +127,7 @@ class ExactPlaces:
     def __call__(self, point: np.ndarray, normal: np.ndarray, deepest_m: float) -> SolvedPlace | None:
         """The place at `point` (3,) m with its outward normal (3,), pressed to `deepest_m`; None where the
         solver finds no equilibrium or the law gives no force."""
-        depths = deepest_m * np.linspace(0.0, 1.0, DEPTHS + 1)[1:]
+        depths = min(deepest_m, MOST_RADII * self._radius) * np.linspace(0.0, 1.0, DEPTHS + 1)[1:]
         key = content_key(*self._content, np.asarray(point), np.asarray(normal), depths)
         path = cache_folder() / "presses" / f"{key[:24]}.bin"
         made = load_or_build(path, key, lambda: {"force": self._solver.press(point, normal, depths).force})

@@ -15,7 +15,7 @@ from mechanics.model.model import Model
 from mechanics.presses.table import LEAD_S, Presses
 from mechanics.progress import Progress, Remaining, silent
 from mechanics.recording.recording import Recording
-from mechanics.recording.samples import runs
+from mechanics.recording.segments import runs
 from mechanics.result import Result
 from render.base import Renderer
 from render.force_error import error_figures, force_errors

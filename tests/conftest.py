@@ -56,3 +56,15 @@ def shared_recordings() -> Path:
 def measured_data() -> Path:
     """The folder of other people's measurements beside the checkout; the same."""
     return _shared("realdata", "measurements")
+
+
+@pytest.fixture
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For a page of which only the words are read: nothing is drawn."""
+    monkeypatch.setattr("palpate.show.page.png_and_drawing", lambda picture: (bytes(24), ""))
+
+
+@pytest.fixture
+def nothing_to_press(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports do not carry the page of their object: seconds each, and tested in tests/palpate/exporting."""
+    monkeypatch.setattr("palpate.exporting.page.button.button", lambda model: "")

@@ -10,7 +10,7 @@ import numpy as np
 from mechanics.errors import ContactError
 from mechanics.recording.calibration import Calibration
 from mechanics.recording.recording import Recording
-from mechanics.recording.samples import delayed
+from mechanics.recording.segments import delayed
 from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s3_contacts.contacts import Exploration
 

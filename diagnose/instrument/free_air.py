@@ -13,7 +13,7 @@ from diagnose.instrument.jackknife import all_but_one, covariance
 from mechanics.presses.table import Presses
 from mechanics.recording.kinematics import acceleration
 from mechanics.recording.recording import Recording
-from mechanics.recording.samples import runs
+from mechanics.recording.segments import runs
 
 BLOCK_S = 0.25
 MIN_BLOCKS = 8

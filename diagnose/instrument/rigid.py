@@ -22,7 +22,7 @@ from diagnose.instrument.jackknife import all_but_one, covariance
 from mechanics.frames import tangents
 from mechanics.presses.table import Presses
 from mechanics.recording.recording import Recording
-from mechanics.recording.samples import runs
+from mechanics.recording.segments import runs
 from mechanics.recording.side_of_play import leads
 
 KINDS = ("trace", "rigid", "retrace")

@@ -6,7 +6,7 @@ from diagnose.numerics.base import DOMAIN, NumericalEffect
 from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.settings import LATE, Scene, Settings
-from mechanics.recording.samples import delayed
+from mechanics.recording.segments import delayed
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

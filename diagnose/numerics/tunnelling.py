@@ -14,7 +14,7 @@ from diagnose.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, Seen, S
 from diagnose.numerics.lost_contact import LONGEST_S
 from mechanics.disk.schema import Key
 from mechanics.effects.base import Parameter, Role, Scope, no_keys
-from mechanics.recording.samples import runs
+from mechanics.recording.segments import runs
 
 INSIDE = 0.5
 """Of a press's greatest depth, beyond which a tip without force is inside without being felt."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from diagnose.other_simulator.stated import Stated
-from diagnose.verdict.result import Diagnosis, EffectEntry
+from diagnose.verdict.result import Diagnosis, EffectEntry, answers_json
 from diagnose.verdict.where import Where
 from mechanics.presses.table import Presses
 from mechanics.result import Result
@@ -110,26 +110,8 @@ class SimulatedGap(Result):
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""
-        closed = self.gap_closed_ci95
         return {
-            "noise_n": self.noise_n,
-            "gap_before_n": self.gap_before_n,
-            "gap_after_n": self.gap_after_n,
-            "gap_closed": self.gap_closed,
-            "gap_closed_ci95": None if closed is None else list(closed),
-            "verdict": {
-                "kind": self.kind,
-                "effects": list(self.effects),
-                "candidates": list(self.candidates),
-            },
-            "where": {
-                "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in self.where.axes],
-                "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in self.where.worst],
-                "bins": self.where.bins,
-            },
-            "effects": [e.as_json() for e in self.entries],
-            "young_modulus_pa": self.young_modulus_pa,
-            "next_touch": None if self.reality.next_touch is None else self.reality.next_touch.as_json(),
+            **answers_json(self, self.reality.next_touch),
             "simulator": self.simulator.as_json(),
             "parts": {name: self.parts[name].as_json() for name in ("reality", "parameters", "numerics")},
             "unexplained": self.unexplained,

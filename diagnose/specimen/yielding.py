@@ -55,7 +55,7 @@ class Way:
 @dataclass(frozen=True)
 class Machine:
     """modulus_pa with its 95 % interval, and stiffness_n_per_m of the machine with its own, by one fit of all
-    curves with `law`; rigid_modulus_pa: of the same law on a rigid machine; rigid_law: of the best on one.
+    curves with `law`; rigid_modulus_pa: of the same law on a rigid machine.
     error, rigid_error: held-out rms over rms of the force."""
 
     modulus_pa: float
@@ -64,7 +64,6 @@ class Machine:
     stiffness_ci95_n_per_m: tuple[float, float]
     law: str
     rigid_modulus_pa: float
-    rigid_law: str
     error: float
     rigid_error: float
 
@@ -232,7 +231,7 @@ def machine_of(
     return Machine(
         float(np.exp(log_e)), (float(np.exp(low[0])), float(np.exp(high[0]))),
         1 / c, (1 / high[1], 1 / max(low[1], 1e-12)),
-        law, float(np.exp(whole[law, False][0])), rigid, errors[law, True], errors[rigid, False],
+        law, float(np.exp(whole[law, False][0])), errors[law, True], errors[rigid, False],
     )  # fmt: skip
 
 

@@ -197,24 +197,7 @@ class Diagnosis(Result):
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""
         return {
-            "noise_n": self.noise_n,
-            "gap_before_n": self.gap_before_n,
-            "gap_after_n": self.gap_after_n,
-            "gap_closed": self.gap_closed,
-            "gap_closed_ci95": None if self.gap_closed_ci95 is None else list(self.gap_closed_ci95),
-            "verdict": {
-                "kind": self.kind,
-                "effects": list(self.effects),
-                "candidates": list(self.candidates),
-            },
-            "where": {
-                "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in self.where.axes],
-                "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in self.where.worst],
-                "bins": self.where.bins,
-            },
-            "effects": [e.as_json() for e in self.entries],
-            "young_modulus_pa": self.young_modulus_pa,
-            "next_touch": None if self.next_touch is None else self.next_touch.as_json(),
+            **answers_json(self, self.next_touch),
             "errors_n": dict(self.errors_n),
             "held_out": {k: {"gap_before_n": a, "gap_after_n": b} for k, (a, b) in self.held_out_n.items()},
             "constant_rmse_n": self.constant_n,
@@ -224,3 +207,28 @@ class Diagnosis(Result):
             "seconds": dict(self.seconds),
             "left_out": list(self.left_out),
         }
+
+
+def answers_json(found: Any, next_touch: NextTouch | None) -> dict[str, Any]:
+    """What the contract says of every gap, a Diagnosis or another simulator's: how large, which, where."""
+    closed = found.gap_closed_ci95
+    return {
+        "noise_n": found.noise_n,
+        "gap_before_n": found.gap_before_n,
+        "gap_after_n": found.gap_after_n,
+        "gap_closed": found.gap_closed,
+        "gap_closed_ci95": None if closed is None else list(closed),
+        "verdict": {
+            "kind": found.kind,
+            "effects": list(found.effects),
+            "candidates": list(found.candidates),
+        },
+        "where": {
+            "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in found.where.axes],
+            "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in found.where.worst],
+            "bins": found.where.bins,
+        },
+        "effects": [e.as_json() for e in found.entries],
+        "young_modulus_pa": found.young_modulus_pa,
+        "next_touch": None if next_touch is None else next_touch.as_json(),
+    }

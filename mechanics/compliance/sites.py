@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -46,7 +46,7 @@ class TouchSites:
     far: np.ndarray
     patch_width_m: float
     poisson_ratio: float
-    bracing: np.ndarray | float = 0.0
+    bracing: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     def __len__(self) -> int:
         return len(self.points)
@@ -168,7 +168,7 @@ def touch_sites(
     far = own_blocks(solver, points, width, lambda share: progress("touch sites", share))
     far += sharpening(solver, points, width, patch.tip_radius_m)
     far -= half_space_compliance(normals, poisson_ratio, width)
-    bracing: np.ndarray | float = 0.0
+    bracing = np.zeros(len(points))
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)
         missed = edge_law(mesh, points, normals)

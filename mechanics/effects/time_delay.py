@@ -9,7 +9,7 @@ from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import LATE, Scene, Settings
 from mechanics.recording.calibration import Calibration
 from mechanics.recording.recording import Recording
-from mechanics.recording.samples import delayed
+from mechanics.recording.segments import delayed
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

@@ -6,12 +6,13 @@ MODEL/mesh.vtu         tetrahedra, device frame, metres; fixed, touchable, shape
                        where the material has one; young_modulus_pa, for people who look: never read back
 MODEL/shape.vtp        the object's surface itself, where it is known (mechanics.shape.true_shape)
 MODEL/presses.bin      the table of presses, samples and all (mechanics.presses.table)
-MODEL/palpations.csv   one row a palpation
+MODEL/palpations.csv   one row a palpation, for people
 MODEL/surface.vtp      what a tip meets, written by the shell (render.surface.felt_surface), keyed by content
 MODEL/compliance-*.bin the cached compliance (mechanics.compliance.compliance), keyed by content"""
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import tomllib
 from collections.abc import Mapping
@@ -23,11 +24,12 @@ import numpy as np
 from mechanics.contact.dent import dent_laws
 from mechanics.disk.reading import read_toml
 from mechanics.disk.schema import ANY, Key, Named, Schema, check_table
+from mechanics.disk.store import read_arrays, write_arrays
 from mechanics.disk.toml_text import dump_toml
 from mechanics.disk.vtk_files import read_vtk, vtk_bytes
-from mechanics.disk.writing import FolderKind, Kind, atomic_folder
+from mechanics.disk.writing import FolderKind, Kind, atomic_file, atomic_folder
 from mechanics.effects.registry import effect_keys
-from mechanics.errors import MeshError, ModelError
+from mechanics.errors import CacheError, MeshError, ModelError
 from mechanics.model.material import (
     BALL,
     GRADIENT,
@@ -39,8 +41,9 @@ from mechanics.model.material import (
     Skin,
 )
 from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.files import read_presses, write_csv, write_presses
+from mechanics.presses.table import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from mechanics.recording.segments import KINDS, Segment
 from mechanics.shape.tetmesh import TetMesh
 from mechanics.shape.true_shape import TrueShape
 
@@ -95,6 +98,9 @@ MODEL = FolderKind(
     ),
 )
 """What `write_model` writes, and what is kept beside it later."""
+_PRESSES_FORMAT = "presses 1"
+CSV_COLUMNS = ("t_onset", "t_peak", "x", "y", "z", "nx", "ny", "nz", "depth", *FITS)
+_PRESSES_NUMBERS = ("tip_radius_m", "sample_rate_hz", "delay_s", "delay_error_s", "block")
 
 
 def write_model(path: Path | str, model: Model) -> Path:
@@ -259,3 +265,50 @@ def _material_of(keys: Mapping[str, Any], ratios: np.ndarray | None) -> Material
     if "inclusions" in keys:
         parts["inclusions"] = {name: Ball(**ball) for name, ball in keys["inclusions"].items()}
     return Material(**parts, field=ratios)
+
+
+def write_csv(path: Path | str, presses: Presses) -> None:
+    """Write `palpations.csv`: a row a press, the contract's columns, SI units, device frame."""
+    table = np.column_stack(
+        [presses.onset_s, presses.peak_s, presses.point, presses.normal, presses.depth_m]
+        + [presses.fits[n] for n in FITS]
+    )
+    with atomic_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(CSV_COLUMNS)
+        writer.writerows([repr(float(v)) for v in row] for row in table)
+
+
+def write_presses(path: Path, presses: Presses) -> None:
+    """Write the table as it stands, samples and all (views with further columns lose those)."""
+    arrays = {
+        n: getattr(presses, n) for n in (*ROW_COLUMNS, *PRESS_COLUMNS) if getattr(presses, n) is not None
+    }
+    arrays |= {f"fit {n}": v for n, v in presses.fits.items()}
+    arrays["numbers"] = np.array([float(getattr(presses, n)) for n in _PRESSES_NUMBERS])
+    arrays["noise"] = np.array(dataclasses.astuple(presses.noise))
+    arrays["segments"] = np.array(
+        [[KINDS.index(s.kind), s.start_s, s.end_s] for s in presses.segments], dtype=float
+    ).reshape(-1, 3)
+    arrays["recording"] = np.frombuffer(presses.recording.encode(), dtype=np.uint8)
+    write_arrays(path, _PRESSES_FORMAT, arrays)
+
+
+def read_presses(path: Path) -> Presses:
+    """Read what `write_presses` wrote; raises ModelError where the file is damaged."""
+    try:
+        arrays = read_arrays(path, _PRESSES_FORMAT)
+        named: dict[str, Any] = {
+            n: np.array(arrays[n]) for n in (*ROW_COLUMNS, *PRESS_COLUMNS) if n in arrays
+        }
+        named |= zip(_PRESSES_NUMBERS, arrays["numbers"].tolist(), strict=True)
+        named["block"] = int(named["block"])
+        return Presses(
+            **named,
+            fits={n: np.array(arrays[f"fit {n}"]) for n in FITS},
+            noise=Noise(*arrays["noise"].tolist()),
+            segments=tuple(Segment(KINDS[int(k)], a, b) for k, a, b in arrays["segments"].tolist()),
+            recording=bytes(arrays["recording"]).decode(),
+        )
+    except (CacheError, KeyError, ValueError, TypeError, IndexError) as error:
+        raise ModelError(f"'{path}' is damaged ({error}): reconstruct the model again") from error

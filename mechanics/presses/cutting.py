@@ -11,8 +11,7 @@ import numpy as np
 from mechanics.presses.repeats import SITE_M, sites_of
 from mechanics.presses.table import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses
 from mechanics.recording.recording import Recording
-from mechanics.recording.samples import runs
-from mechanics.recording.segments import ON_SUPPORT, Segment
+from mechanics.recording.segments import ON_SUPPORT, Segment, runs
 from mechanics.robust import read_columns, spread_about_zero
 
 AROUND_S = 0.3

@@ -20,15 +20,8 @@ import numpy as np
 
 from mechanics.errors import ModelError
 from mechanics.frames import local_frames
-from mechanics.recording.samples import delayed
-from mechanics.recording.segments import Segment, within
+from mechanics.recording.segments import Segment, delayed, within
 
-CANNOT_TELL = {
-    "slide": ("modulus", "1D law", "first touch"),
-    "cycle": ("force in free air", "adhesion", "own first touch: it follows from the law of the others"),
-    "points": ("rates", "delay", "memory", "drift", "force in free air", "own noise"),
-}
-"""What a segment of a kind says nothing of; the other kinds show everything."""
 FITS = ("k_kv", "b_kv", "k_hc", "b_hc", "r_hc", "k_v", "k_c", "r_c", "k_h", "e_pa")
 """What is fitted to each press: Kelvin-Voigt, eq. (1): k_kv N/m, b_kv N s/m; Hunt-Crossley, eq. (2): k_hc
 N/m^r, b_hc N s/m^(r+1), r_hc; without damping k_v N/m, eq. (5), k_c N/m^r, r_c, eq. (6), and k_h N/m^r, eq.

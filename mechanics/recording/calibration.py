@@ -20,7 +20,7 @@ from mechanics.disk.toml_text import dump_toml
 from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import RecordingError
 from mechanics.quantities import TIP_RADIUS
-from mechanics.recording.samples import delayed
+from mechanics.recording.segments import delayed
 from mechanics.recording.side_of_play import leads, play
 from mechanics.result import Result
 

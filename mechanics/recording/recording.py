@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import gzip
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -289,19 +289,7 @@ def write_recording(
     path = samples_path(path)
     [(description, kind)] = description_of(path)
     check_target(description, kind)
-    columns = [recording.t[:, None], recording.position, recording.force_on_tool]
-    formats = ["%.4f"] + ["%.9f"] * 3 + ["%.6f"] * 3
-    names = list(REQUIRED_COLUMNS)
-    if recording.quaternion is not None:
-        columns.append(recording.quaternion)
-        formats += ["%.7f"] * 4
-        names += QUATERNION_COLUMNS
-    with atomic_file(path, SAMPLES) as temporary:
-        opener = gzip.open if path.suffix == ".gz" else open
-        with opener(temporary, "wt", encoding="utf-8", newline="\n") as file:
-            np.savetxt(
-                file, np.hstack(columns), fmt=formats, delimiter=",", header=",".join(names), comments=""
-            )
+    write_samples(path, recording, ["%.4f"] + ["%.9f"] * 3 + ["%.6f"] * 3 + ["%.7f"] * 4)
     table = description_table(recording)
     if truth is not None:
         table["truth"] = dict(truth)
@@ -311,6 +299,20 @@ def write_recording(
     with atomic_file(description, kind) as temporary:
         temporary.write_text("\n".join(words), encoding="utf-8")
     return path
+
+
+def write_samples(path: Path, recording: Recording, formats: Sequence[str]) -> None:
+    """Write the samples, in these formats of t, x, y, z, fx, fy, fz and, where they are there, qw to qz."""
+    columns = [recording.t[:, None], recording.position, recording.force_on_tool]
+    names = list(REQUIRED_COLUMNS)
+    if recording.quaternion is not None:
+        columns.append(recording.quaternion)
+        names += QUATERNION_COLUMNS
+    header, written = ",".join(names), list(formats[: len(names)])
+    with atomic_file(path, SAMPLES) as temporary:
+        opener = gzip.open if path.suffix == ".gz" else open
+        with opener(temporary, "wt", encoding="utf-8", newline="\n") as file:
+            np.savetxt(file, np.hstack(columns), fmt=written, delimiter=",", header=header, comments="")
 
 
 def description_table(recording: Recording) -> dict[str, Any]:

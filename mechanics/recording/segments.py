@@ -1,4 +1,4 @@
-"""Stretches of a recording and their kinds: what was done when."""
+"""Stretches of a recording and their kinds: what was done when; runs of samples, series that read late."""
 
 from __future__ import annotations
 
@@ -33,3 +33,23 @@ def within(segments: Iterable[Segment], kind: str, t: np.ndarray) -> np.ndarray:
         if segment.kind == kind:
             inside |= (t >= segment.start_s) & (t <= segment.end_s)
     return inside
+
+
+def runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    """[start, end) of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def delayed(parts: Iterable[slice], t: np.ndarray, values: np.ndarray, delay_s: float) -> np.ndarray:
+    """(n, 3), values (n, 3) at times t (n,) s as they read `delay_s` late (negative: earlier).
+
+    parts: stretches that know nothing of one another; the ends of each are held.
+    """
+    if delay_s == 0:
+        return values
+    out = np.empty_like(values)
+    for part in parts:
+        for axis in range(3):
+            out[part, axis] = np.interp(t[part] - delay_s, t[part], values[part, axis])
+    return out

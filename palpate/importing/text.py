@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import csv
 import gzip
+import math
 import re
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
 from mechanics.errors import RecordingError
-from palpate.importing.dates import seconds_of
 from palpate.importing.tables import Table
 from palpate.importing.units import is_unit, without_unit
 
@@ -23,6 +24,9 @@ _MISSING = ("", "-", "--", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-
 """What stands in a cell that holds nothing."""
 _THOUSANDS = re.compile(r"[-+]?\d{1,3}(,\d{3})+(\.\d*)?")
 _FORTRAN = re.compile(r"[-+]?\d*\.?\d*[dD][-+]?\d+")
+_ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
+_DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ](\d{1,2}:\d\d.*)")
+_CLOCK = re.compile(r"(\d{1,3}):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 
 
 def read(path: Path) -> list[Table]:
@@ -147,3 +151,24 @@ def _grouped(groups: list[str], header: list[str]) -> list[str]:
         group = own or group
         found.append(f"{group} ({name})" if is_unit(name) else f"{group} {name}".strip())
     return found
+
+
+def seconds_of(text: str) -> float:
+    """s since 1970 of '2026-11-22T13:05:01.25' or '22.11.2026 13:05:01,25', since midnight of '13:05:01.25';
+    nan of anything else. Without a zone it is UTC."""
+    text = text.strip().replace(",", ".")
+    day_first = _DAY_FIRST.fullmatch(text)
+    if day_first:
+        day, month, year, clock = day_first.groups()
+        text = f"{year}-{month:>02}-{day:>02} {clock}"
+    if _ISO.match(text):
+        try:
+            at = datetime.fromisoformat(text)
+        except ValueError:
+            return math.nan
+        return (at if at.tzinfo else at.replace(tzinfo=UTC)).timestamp()
+    clock_only = _CLOCK.fullmatch(text)
+    if clock_only:
+        hours, minutes, seconds = clock_only.groups()
+        return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds or 0.0)
+    return math.nan

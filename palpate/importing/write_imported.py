@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,8 +10,8 @@ import numpy as np
 
 from mechanics.disk.toml_text import dump_toml
 from mechanics.disk.writing import Kind, atomic_file
-from mechanics.recording.files import DESCRIPTION, SAMPLES, samples_path
-from mechanics.recording.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS
+from mechanics.recording.files import DESCRIPTION, samples_path
+from mechanics.recording.recording import write_samples
 from palpate.importing.convert import Understood
 from palpate.show.page import subplots
 
@@ -33,17 +32,7 @@ def write_imported(
     came from; returns the samples' path."""
     path = samples_path(path)
     recording = understood.recording
-    columns = [recording.t[:, None], recording.position, recording.force_on_tool]
-    names = list(REQUIRED_COLUMNS)
-    if recording.quaternion is not None:
-        columns.append(recording.quaternion)
-        names += QUATERNION_COLUMNS
-    with atomic_file(path, SAMPLES) as temporary:
-        opener = gzip.open if path.suffix == ".gz" else open
-        with opener(temporary, "wt", encoding="utf-8", newline="\n") as file:
-            np.savetxt(
-                file, np.hstack(columns), fmt="%.9g", delimiter=",", header=",".join(names), comments=""
-            )
+    write_samples(path, recording, ["%.9g"] * 11)
     about: dict[str, Any] = {"sample_rate_hz": recording.sample_rate_hz, "force_on": "tool"}
     if understood.quasi_static:
         about["quasi_static"] = True

@@ -2,7 +2,7 @@
 
 Started by palpate.servo.client as `python -m palpate.servo BLOCK PARENT` with a pickled `Job` on standard
 input, further pickled commands after it, and one JSON line a message on standard output. Threads: this one
-waits for the loop's end, one for commands, one for the parent's end (palpate.servo.orphan), the loop ticks,
+waits for the loop's end, one for commands, one for the parent's end (`end_with_parent`), the loop ticks,
 the device thread talks to the device.
 """
 
@@ -14,7 +14,9 @@ import pickle
 import signal
 import sys
 import threading
+import time
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
@@ -22,14 +24,13 @@ import numpy as np
 
 from devices.mapper import MapperOptions, Mapping
 from devices.registry import DeviceChoice
-from devices.safety import safety_parameters
+from devices.safety import LATCHING, safety_parameters
 from mechanics.errors import DeviceError, OptionError, PalpateError
 from mechanics.model.model import Model
 from palpate.servo.device_thread import DeviceThread
-from palpate.servo.layout import ENABLE, MOST_TIPS, STOP, SharedBlock
+from palpate.servo.layout import ENABLE, MOST_TIPS, ROW, STOP, SharedArrays, SharedBlock
 from palpate.servo.loop import Program, ServoLoop, make_program
 from palpate.servo.options import ServoOptions
-from palpate.servo.orphan import end_with_parent
 from palpate.servo.realtime import lock_memory, quiet_interpreter, real_time_thread
 from palpate.servo.source import RendererSource
 from palpate.servo.tick import TickParameters, tick_arrays
@@ -42,6 +43,8 @@ GO = "go"
 """What follows a job once all is compiled that another process compiles for it."""
 STEPS_IN = 30
 """Ticks in which a press that is under way is made again by another renderer."""
+LOOK_S = 0.1
+GRACE_S = 0.7
 
 
 @dataclass(frozen=True)
@@ -283,3 +286,32 @@ def main(argv: list[str]) -> int:
         return 2
     tell({"ended": True})
     return 0
+
+
+def end_with_parent(parent: int, arrays: SharedArrays, goes_on: Callable[[], bool]) -> None:
+    """Watch in a thread of its own: zero and an ordinary end at once, a hard one after GRACE_S.
+
+    The end of the input is no proof of the parent's: a process that it forked holds the other end open.
+
+    goes_on: whether this servo is to outlive its parent; it does for as long as it has a force to give, since
+    nobody is left who could enable it. Systems without a parent that changes tell by the input's end alone.
+    """
+    if os.name != "posix":
+        return
+
+    def watch() -> None:
+        while os.getppid() == parent or (goes_on() and _gives_force(arrays)):
+            time.sleep(LOOK_S)
+        arrays.control[ENABLE] = 0
+        arrays.control[STOP] = 1
+        time.sleep(GRACE_S)
+        # still loading, compiling, or in a driver that hangs: what the device does then is its own rule
+        os._exit(1)
+
+    threading.Thread(target=watch, name="servo's parent", daemon=True).start()
+
+
+def _gives_force(arrays: SharedArrays) -> bool:
+    """Whether force is enabled and no fault has latched."""
+    last = arrays.ring[int(arrays.ring_head[0] - 1) % len(arrays.ring)].view(ROW)[0]
+    return bool(arrays.control[ENABLE]) and not int(last["reasons"]) & LATCHING

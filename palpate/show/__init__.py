@@ -46,7 +46,7 @@ _KINDS: dict[str, str | ModuleType] = {
     "diagnose.compare.comparison.Comparison": "comparison",
     "diagnose.compare.before_after.Changes": "changes",
     "diagnose.verdict.result.Diagnosis": "diagnosis",
-    "diagnose.other_simulator.result.SimulatedGap": "simulated",
+    "diagnose.other_simulator.result.SimulatedGap": "other_simulator",
     "diagnose.explore.explored.Explored": "exploration",
     "diagnose.specimen.result.Material": "material",
     "scenes.laboratory.simulate.Simulation": "simulation",

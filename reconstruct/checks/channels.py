@@ -10,8 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.ndimage import label, maximum, median_filter
 
-from mechanics.recording.samples import runs
-from mechanics.recording.segments import within
+from mechanics.recording.segments import runs, within
 from mechanics.robust import spread_about_zero
 from reconstruct.checks.finding import Finding, decades_of_tail, p_words, sure
 from reconstruct.checks.samples import CHANNELS, Samples

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mechanics.recording.samples import runs
+from mechanics.recording.segments import runs
 from reconstruct.checks.finding import Finding
 from reconstruct.checks.samples import Samples
 

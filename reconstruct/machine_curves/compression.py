@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mechanics.disk.reading import reading
 from mechanics.errors import RecordingError
 
 
@@ -29,13 +30,7 @@ def read_compression(path: Path | str) -> Compression:
     its header disagree about. Raises RecordingError where a line or column is missing.
     """
     path = Path(path)
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as error:
-        raise RecordingError(f"'{path}' cannot be read: {error.strerror}") from error
-    start = next((i for i, line in enumerate(lines) if line.lower().startswith("time")), None)
-    if start is None:
-        raise RecordingError(f"'{path}' has no header line that starts with 'Time'")
+    lines, start = exported(path)
     sizes = {}
     for key, _, value in (line.partition(":") for line in lines[:start]):
         if key.startswith("Cylinder "):
@@ -58,3 +53,14 @@ def read_compression(path: Path | str) -> Compression:
     return Compression(
         np.abs(compression) / 1e3 / sizes["Height"], np.abs(load) / area, sizes["Diameter"], sizes["Height"]
     )
+
+
+def exported(path: Path) -> tuple[list[str], int]:
+    """The lines of an export, and the number of the one that heads its columns: it starts with 'Time'. Raises
+    RecordingError where there is none."""
+    with reading(path, RecordingError):
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    start = next((i for i, line in enumerate(lines) if line.lower().startswith("time")), None)
+    if start is None:
+        raise RecordingError(f"'{path}' has no header line that starts with 'Time'")
+    return lines, start

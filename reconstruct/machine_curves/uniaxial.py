@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from mechanics.errors import RecordingError
-from reconstruct.machine_curves.compression import read_compression
+from reconstruct.machine_curves.compression import exported, read_compression
 
 MOST_STRAIN = 0.4
 BLOCKS = 8
@@ -61,13 +61,7 @@ def read_tension(path: Path | str) -> Uniaxial:
     """A pull to failure: a ';' table with engineering strain and engineering stress (MPa), under a header of
     key; value lines. Raises RecordingError where a column is missing."""
     path = Path(path)
-    try:
-        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    except OSError as error:
-        raise RecordingError(f"'{path}' cannot be read: {error.strerror}") from error
-    start = next((i for i, line in enumerate(lines) if line.lower().startswith("time")), None)
-    if start is None:
-        raise RecordingError(f"'{path}' has no header line that starts with 'Time'")
+    lines, start = exported(path)
     names = [name.strip().lower() for name in lines[start].split(";")]
     wanted = [next((i for i, n in enumerate(names) if n.startswith(w)), -1) for w in _TENSION]
     if min(wanted) < 0:

@@ -28,7 +28,7 @@ from render.surface.shaped import (
     halved_where_bent,
     on_shape,
 )
-from render.surface.triangles import pseudonormals
+from render.surface.triangles import faces, pseudonormals
 
 CREASE_DEGREES = 35.0
 
@@ -124,10 +124,7 @@ def with_vertices(
     vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, free: np.ndarray
 ) -> SurfaceArrays:
     """The kernels' arrays for these vertices: normals, pseudonormals and search tree."""
-    p = vertices[triangles]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    length = np.linalg.norm(area, axis=1, keepdims=True)
-    face = area / np.where(length > 0, length, 1.0)
+    area, face = faces(vertices, triangles)
     edge_pseudo = face[:, None, :] + face[neighbours]
     return SurfaceArrays(
         vertices=np.ascontiguousarray(vertices),
@@ -137,7 +134,7 @@ def with_vertices(
         free=free,
         vertex_pseudo=pseudonormals(vertices, triangles),
         edge_pseudo=np.ascontiguousarray(edge_pseudo),
-        bvh=build_bvh(p),
+        bvh=build_bvh(vertices[triangles]),
     )
 
 

@@ -12,6 +12,7 @@ from diagnose.instrument.rigid import Rigid
 from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.attribution import Attribution, attribute
 from diagnose.search.evidence import Search
+from diagnose.search.fewer import fewer
 from diagnose.search.fit import settings_of
 from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Effect
@@ -66,6 +67,28 @@ def test_a_memory_beside_a_play_that_the_support_showed_is_one_name_more(bench):
     known = seen_play(rigid, set())
     found = answer(bench, lambda t, x, f: (followed(x), relaxed(t, f)), known)
     assert set(found.chosen) == {"backlash", "viscoelasticity"}
+
+
+def put_back(bench, alter, *chosen: str) -> list[str]:
+    """What is left of an answer."""
+    search = search_on(bench, alter)
+    base = search.judge([search.finite_strain])
+    alone = {}
+    for name in TRIED:
+        candidate = search.judge([*base.found.effects, effect(name)], like=base)
+        alone[name] = search.score([effect(name)], candidate, base)
+    whole = search.judge([*base.found.effects, *(effect(n) for n in chosen)], like=base)
+    return fewer(search, chosen, whole, alone, frozenset())[1]
+
+
+def test_two_names_are_put_back_to_the_play_that_does_as_well(bench):
+    found = put_back(bench, lambda t, x, f: (followed(x), f), "viscoelasticity", "time_delay")
+    assert found == ["backlash"]
+
+
+def test_two_names_that_are_both_there_stay(bench):
+    found = put_back(bench, lambda t, x, f: (followed(x), relaxed(t, f)), "backlash", "viscoelasticity")
+    assert found == ["backlash", "viscoelasticity"]
 
 
 def test_the_side_is_surest_where_the_reading_moves():

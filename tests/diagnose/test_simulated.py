@@ -38,17 +38,21 @@ OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
 
 @pytest.fixture(scope="module")
 def world(bench):
-    """(recording, model, its diagnosis, the law's own force without noise)."""
+    """(recording, model, its diagnosis, the law's own force without noise, answers that were given)."""
     recording, model = bench.record(law="linear")
     exact = {}
     bench.record(lambda t, x, f: exact.update(force=f.copy()) or (x, f), law="linear")
-    return recording, model, diagnose(recording, model, FAST), exact["force"]
+    return recording, model, diagnose(recording, model, FAST), exact["force"], {}
 
 
 def judged(world, force, **stated):
-    recording, model, reality, _ = world
-    asked = Asked(Forces(recording.t, force, "a simulator"), stated_of(stated, model), OWN_CLOCK)
-    return diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    """The answer to a force; tests that ask the same share it."""
+    recording, model, reality, _, answers = world
+    key = force.tobytes(), *stated.items()
+    if key not in answers:
+        asked = Asked(Forces(recording.t, force, "a simulator"), stated_of(stated, model), OWN_CLOCK)
+        answers[key] = diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    return answers[key]
 
 
 def shares(result):
@@ -249,7 +253,7 @@ def test_mujoco_as_documented_lets_a_deep_press_through(tmp_path, monkeypatch):
 
 
 def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):
-    recording, model, _, force = world
+    recording, model, _, force, _ = world
     presses, t = model.presses, recording.t
     with pytest.raises(OptionError, match="--simulated-force-on object"):
         aligned(Forces(t, -force, "x"), presses, ForcesOptions())
@@ -264,7 +268,7 @@ def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):
 
 
 def test_missing_rows_and_another_rate_are_told(world):
-    recording, model, _, force = world
+    recording, model, _, force, _ = world
     presses, t = model.presses, recording.t
     kept = ~((t > presses.onset_s[2]) & (t < presses.onset_s[2] + 0.3))
     some = aligned(Forces(t[kept][::4], force[kept][::4], "x"), presses, OWN_CLOCK)
@@ -277,7 +281,7 @@ def test_missing_rows_and_another_rate_are_told(world):
 
 
 def test_a_press_without_rows_is_left_out_of_the_answer(world):
-    recording, model, reality, force = world
+    recording, model, reality, force, _ = world
     t, onset = recording.t, model.presses.onset_s[2]
     kept = ~((t > onset) & (t < onset + 0.3))
     asked = Asked(Forces(t[kept], 1.5 * force[kept], "x"), stated_of({}, model), OWN_CLOCK)
@@ -288,7 +292,7 @@ def test_a_press_without_rows_is_left_out_of_the_answer(world):
 
 def test_a_simulator_that_was_run_over_some_presses_is_judged_by_these_alone(world):
     """What it was not run over is zero there, which is no contact that was lost."""
-    recording, model, reality, force = world
+    recording, model, reality, force, _ = world
     presses, t = model.presses, recording.t
     chosen = spread_out(presses, 8)
     assert chosen.sum() == 8 and not (chosen & ~spread_out(presses, 12)).any()  # fewer are some of more

@@ -270,7 +270,7 @@ def test_bars_are_few_and_are_the_gaps_without_and_with_what_was_found(delayed):
     assert ax.lines[0].get_xdata()[0] == pytest.approx(1e3 * result.noise_n)
 
 
-def test_what_the_model_already_has_is_not_proposed_again(delayed, tmp_path):
+def test_what_the_model_already_has_is_not_proposed_again(delayed, tmp_path, no_pictures):
     """The verdict, the terminal and the page agree; JSON still names every effect."""
     recording, model, found = delayed
     both = dataclasses.replace(found, effects=("time_delay", "finite_strain"), kind="effect")

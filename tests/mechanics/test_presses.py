@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mechanics.errors import ModelError
+from mechanics.model.files import read_presses, write_csv, write_presses
 from mechanics.presses.cutting import FoundAround, FoundPresses, cut, free_segments
-from mechanics.presses.files import read_presses, write_csv, write_presses
 from mechanics.presses.making import of_places
 from mechanics.presses.repeats import sites_of
 from mechanics.presses.table import FITS

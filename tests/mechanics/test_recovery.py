@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.compliance.patch import triangle_shapes
+from mechanics.compliance.surface_compliance import edge_middles
 from mechanics.shape.nearest import closest
-from mechanics.shape.recovery import edge_middles
 
 
 def surface(box):

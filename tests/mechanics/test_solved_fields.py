@@ -92,7 +92,7 @@ def test_fields_that_differ_little_share_a_factorisation(factorised):
     log = _field(places, 0.3, 0)
     far_in_field(places, log)
     shared = []
-    for seed in (1, 2, 3):
+    for seed in (1, 2):
         other = log + _field(places, 0.1, seed)
         shared.append((other, far_in_field(places, other)))
     assert len(factorised) == 1

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
+from mechanics.compliance.sites import touch_solver
+from mechanics.elastic.solver import Solver
 from mechanics.recording.recording import Recording
+from mechanics.shape.tetmesh import TetMesh
 
 from .exploration_of_cylinder import explore_cylinder
 
@@ -14,3 +19,22 @@ from .exploration_of_cylinder import explore_cylinder
 def cylinder() -> tuple[Recording, np.ndarray]:
     """A simulated exploration of a cylinder in a tilted, shifted frame, and the times of first touch."""
     return explore_cylinder()
+
+
+@pytest.fixture(scope="module")
+def factorised_once() -> Iterator[None]:
+    """Reconstructions whose meshes are the same share a factorisation, of the last two meshes."""
+    kept: dict[tuple[bytes, float], Solver] = {}
+
+    def shared(mesh: TetMesh, poisson_ratio: float) -> Solver:
+        arrays = (mesh.points, mesh.tetrahedra, mesh.fixed, mesh.touchable)
+        key = b"".join(array.tobytes() for array in arrays), poisson_ratio
+        if key not in kept:
+            kept[key] = touch_solver(mesh, poisson_ratio)
+            while len(kept) > 2:
+                del kept[next(iter(kept))]
+        return kept[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("reconstruct.methods.touch_solver", shared)
+        yield

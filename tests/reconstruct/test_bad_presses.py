@@ -50,16 +50,20 @@ def spoilt(how: str) -> Recording:
     return dataclasses.replace(recording, force_on_tool=force)
 
 
+ALIKE = ("weak", "pulls", "pulls at last", "upside down")
+"""Ways of being bad that the others have in them."""
+
+
 @pytest.fixture(scope="module")
-def good() -> Reconstruction:
+def good(factorised_once) -> Reconstruction:
     return reconstruct_fully(points(rows=ROWS), SLAB)
 
 
 @pytest.mark.parametrize(
     "how",
     [
-        "weak", "weak and rubbing", "pulls at last", "pulls and rubs", "negative, weak at last", "pulls",
-        "upside down", "offset 0.1",
+        "weak and rubbing", "pulls and rubs", "negative, weak at last", "offset 0.1",
+        *(pytest.param(how, marks=pytest.mark.slow) for how in ALIKE),
     ],
 )  # fmt: skip
 def test_a_bad_place_ends_no_recording_of_points(good, how):
@@ -95,7 +99,7 @@ def test_what_is_left_out_says_which_press_and_why():
     assert "(rows 73 to 78) has a force that does not grow inwards" in why
 
 
-def test_a_bad_press_ends_no_recording_with_a_time():
+def test_a_bad_press_ends_no_recording_with_a_time(factorised_once):
     recording = raster()
     good = reconstruct_fully(recording, SLAB)
     starts = np.searchsorted(recording.t, good.exploration.presses.onset_s)

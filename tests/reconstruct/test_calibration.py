@@ -14,7 +14,7 @@ from diagnose.calibrate.on_plate import calibrate_on_plate
 from mechanics.errors import ContactError, OptionError, RecordingError
 from mechanics.recording.calibration import Calibration, read_calibration
 from mechanics.recording.recording import read_recording, write_recording
-from mechanics.recording.samples import delayed
+from mechanics.recording.segments import delayed
 from palpate import cli
 from reconstruct.geometry.in_device_frame import nowhere
 from reconstruct.steps.s3_contacts.contacts import explore

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+import palpate.show  # noqa: F401  what a reconstruction says
 from mechanics.model.one_d_laws import RIVALS
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.methods import ReconstructOptions
@@ -29,7 +30,7 @@ def firmer_along_x(ratio: float):
 
 
 @pytest.fixture(scope="module")
-def varied():
+def varied(factorised_once):
     return reconstruct_fully(firmer_along_x(3.0), WHERE_BEATEN)
 
 
@@ -59,7 +60,7 @@ def test_a_field_is_fitted_where_one_modulus_is_beaten(varied):
     assert "1D" not in varied.lines()[0] and varied.as_json()["beaten_by"] is None
 
 
-def test_an_even_ground_stays_of_one_modulus():
+def test_an_even_ground_stays_of_one_modulus(factorised_once):
     made = reconstruct_fully(points((6, 5), rows=8), WHERE_BEATEN)
     assert made.held_out.beaten_by == "" and made.held_out.floor in RIVALS
     assert "modulus field" not in made.seconds

@@ -13,12 +13,10 @@ import reconstruct.steps.s5_mesh.meshing as meshing_module
 from benchmarks._surface_truth import phantom_truth, touch
 from mechanics.errors import MeshError, SurfaceError
 from reconstruct.shapes.coarse_drawing import balanced
-from reconstruct.shapes.voxels import labels, voxel_surface
 from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, reconstruct_surface
-from reconstruct.steps.s5_mesh import element_shape
-from reconstruct.steps.s5_mesh.element_shape import radius_edge_ratio, relaxed
-from reconstruct.steps.s5_mesh.meshing import MeshingOptions, _held, mesh_surface
+from reconstruct.steps.s5_mesh.meshing import MeshingOptions, _held, mesh_surface, radius_edge_ratio, relaxed
 from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
+from reconstruct.steps.s5_mesh.voxels import labels, voxel_surface
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +127,7 @@ def test_a_mesh_beyond_its_bound_is_made_anew_and_the_best_is_kept(surface, monk
         return radius_edge_ratio(mesh.points[mesh.tetrahedra]).max()
 
     # no mesh is that regular: all tries are made, and relaxing them to the end would only take longer
-    monkeypatch.setattr(element_shape, "_SWEEPS", 2)
+    monkeypatch.setattr(meshing_module, "_SWEEPS", 2)
     found = meshing_module.fill(surface, MeshingOptions(mesh_size_m=0.015, radius_edge_ratio=0.9))
     assert len(made) == 3 and worst(found) == min(map(worst, made))
     made.clear()

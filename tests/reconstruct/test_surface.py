@@ -183,27 +183,29 @@ def test_touches_on_the_support_alone_are_refused():
         reconstruct_surface(replace(evidence, centres=flat))
 
 
-def test_the_labelled_recordings_meet_the_targets(shared_recordings):
+@pytest.mark.parametrize(
+    ("stem", "name"),
+    [
+        ("silicone-2-block", "block"),
+        pytest.param("silicone-1-cylinder", "cylinder", marks=pytest.mark.slow),
+        pytest.param("silicone-3-halfsphere", "half-sphere", marks=pytest.mark.slow),
+        pytest.param("example-time-delay", "cylinder", marks=pytest.mark.slow),
+    ],
+)
+def test_the_labelled_recordings_meet_the_targets(shared_recordings, stem, name):
     from mechanics.recording.recording import read_recording
     from reconstruct.steps.s3_contacts.contacts import explore
     from reconstruct.steps.s4_surface.surface import evidence_of
 
-    stems = {
-        "silicone-1-cylinder": "cylinder",
-        "silicone-2-block": "block",
-        "silicone-3-halfsphere": "half-sphere",
-        "example-time-delay": "cylinder",
-    }
-    for stem, name in stems.items():
-        recording = read_recording(shared_recordings / f"{stem}.toml")
-        found = reconstruct_surface(evidence_of(explore(recording)))
-        truth = recording.truth
-        turn = np.array(truth.get("device_from_object_rotation", np.eye(3)))
-        shift = 1e-3 * np.array(truth.get("device_from_object_shift_mm", [0, 0, 0]))
-        error = deviation(phantom_truth(name), (found.vertices - shift) @ turn, found.triangles)
-        assert error["mean_m"] < MEAN_M, stem
-        assert error["p95_m"] < P95_M, stem
-        assert abs(error["volume_error"]) < VOLUME, stem
+    recording = read_recording(shared_recordings / f"{stem}.toml")
+    found = reconstruct_surface(evidence_of(explore(recording)))
+    truth = recording.truth
+    turn = np.array(truth.get("device_from_object_rotation", np.eye(3)))
+    shift = 1e-3 * np.array(truth.get("device_from_object_shift_mm", [0, 0, 0]))
+    error = deviation(phantom_truth(name), (found.vertices - shift) @ turn, found.triangles)
+    assert error["mean_m"] < MEAN_M
+    assert error["p95_m"] < P95_M
+    assert abs(error["volume_error"]) < VOLUME
 
 
 def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
@@ -232,8 +234,8 @@ def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
 
 
 def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_walls():
+    from reconstruct.shapes.choice import direction_score, try_shapes
     from reconstruct.shapes.prism import Prism
-    from reconstruct.steps.s4_surface.shape_choice import direction_score, try_shapes
 
     truth = phantom_truth("bowl")
     evidence, _ = touch(truth, 0)
@@ -246,7 +248,7 @@ def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_wa
 
 def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeypatch):
     """A field beside a block once ended 1.8 m below the support."""
-    from reconstruct.steps.s4_surface import shape_choice as module
+    from reconstruct.steps.s4_surface import surface as module
 
     evidence, _ = touch(phantom_truth("cylinder"), 0)
     honest, tried = module.draw, []

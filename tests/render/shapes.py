@@ -97,6 +97,6 @@ def quick_compliance(made: Model) -> SurfaceCompliance:
     )
 
 
-def fem(made: Model, **options) -> FemRenderer:
-    """A finite-element renderer on the quick compliance."""
-    return FemRenderer(made, RenderOptions(**options), compliance=quick_compliance(made))
+def fem(made: Model, compliance: SurfaceCompliance | None = None, **options) -> FemRenderer:
+    """A finite-element renderer on the quick compliance, solved here where it is not given."""
+    return FemRenderer(made, RenderOptions(**options), compliance=compliance or quick_compliance(made))

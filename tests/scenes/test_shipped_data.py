@@ -55,6 +55,11 @@ def test_nothing_is_computed_for_a_first_touch(model: Model, monkeypatch: pytest
     with_own_stiffness(FemRenderer(model))
 
 
+@pytest.mark.parametrize(
+    "model",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name != "demo")) for name in SHIPPED],
+    indirect=True,
+)
 def test_places_give_as_they_would_if_they_were_solved_today(model: Model) -> None:
     compliance = load_or_condense(model)
     points, normals = compliance.own_points, compliance.own_normals

@@ -15,11 +15,11 @@ from mechanics.errors import ModelError
 from mechanics.model.model import Model
 from mechanics.presses.table import Presses
 from mechanics.progress import Progress, silent
-from palpate.exporting.page.band import force_band
 from palpate.exporting.page.packed import Block, modes_of
 from palpate.exporting.page.tables import depths_of, greatest_depth, responses, straight_forces
 from render.base import Renderer
 from render.fem.renderer import FemRenderer
+from render.force_error import law_share, place_numbers
 from render.registry import create
 
 ONE_D = "hunt-crossley"
@@ -31,6 +31,8 @@ CURVE_POINTS = 48
 _NO_SLIP = 1e9
 _SIDEWAYS = 0.5
 """How far a press goes aside for each metre of depth when errors of sideways stiffness are weighed."""
+UNKNOWN_SHARE = 0.1
+"""Of the modulus, where a model states no interval."""
 
 
 def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Block, dict[str, Any]]:
@@ -194,3 +196,19 @@ def _thinned(depth_m: np.ndarray, force_n: np.ndarray) -> tuple[np.ndarray, np.n
     ]
     means = [np.array([values[rows].mean() for rows in parts]) for values in (depth_m, force_n)]
     return means[0], means[1]
+
+
+def force_band(renderer: FemRenderer, depth_m: np.ndarray) -> np.ndarray:
+    """(v, k) 95 % half width of the force over the force, at the v vertices of the renderer's surface and
+    depths (k,) m.
+
+    The model's interval of its modulus and the law's own error (render.force_error), taken as independent.
+    """
+    model = renderer.model
+    low, high = model.material.young_modulus_ci95_pa
+    modulus = UNKNOWN_SHARE
+    if np.isfinite([low, high]).all():
+        modulus = 0.5 * (high - low) / model.material.young_modulus_pa
+    radius = model.tool.tip_radius_m
+    numbers = place_numbers(renderer, radius)
+    return np.hypot(modulus, law_share(depth_m / radius, *numbers[:, :, None]))

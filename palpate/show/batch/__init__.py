@@ -10,8 +10,7 @@ import numpy as np
 from mechanics.model.files import read_model
 from palpate.batching.run import Batch
 from palpate.batching.steps import MODEL
-from palpate.show.batch.figures import draw_agreement
-from palpate.show.batch.page import lead, next_steps, report, verdict_words
+from palpate.show.batch.page import draw_agreement, lead, next_steps, report, verdict_words
 from palpate.show.scenery import OBJECT_COLOUR, surface_of
 
 if TYPE_CHECKING:

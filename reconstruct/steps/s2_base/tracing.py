@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.errors import NoBaseError
-from mechanics.recording.samples import runs
+from mechanics.recording.segments import runs
 from reconstruct.shapes.points import FLAT, fit_plane
 
 _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane

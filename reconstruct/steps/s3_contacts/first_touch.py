@@ -14,8 +14,7 @@ import numpy as np
 
 from mechanics.errors import ContactError, LoudAirError
 from mechanics.recording.recording import Recording
-from mechanics.recording.samples import runs
-from mechanics.recording.segments import ON_SUPPORT, Segment
+from mechanics.recording.segments import ON_SUPPORT, Segment, runs
 from reconstruct.steps.s1_filter.signals import Filtered, Signals, stated_tracing
 from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions, find_boundary
 from reconstruct.steps.s2_base.tracing import find_interval

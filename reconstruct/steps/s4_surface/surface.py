@@ -16,14 +16,7 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.shape.true_shape import TrueShape
 from reconstruct.shapes.candidates import FITTED, HiddenOutlineError
-from reconstruct.shapes.coarse_drawing import balanced
-from reconstruct.shapes.convex_bounds import gap_to_other_bound, hull_surface, tangent_surface, volume_bounds
-from reconstruct.shapes.drawing import draw
-from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence
-from reconstruct.shapes.fit import Seen
-from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
-from reconstruct.shapes.polyhedron import refine
-from reconstruct.steps.s4_surface.shape_choice import (
+from reconstruct.shapes.choice import (
     best_drawn,
     held_out_error,
     reason,
@@ -31,6 +24,13 @@ from reconstruct.steps.s4_surface.shape_choice import (
     score,
     try_shapes,
 )
+from reconstruct.shapes.coarse_drawing import balanced
+from reconstruct.shapes.convex_bounds import gap_to_other_bound, hull_surface, tangent_surface, volume_bounds
+from reconstruct.shapes.drawing import draw
+from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence
+from reconstruct.shapes.fit import Seen
+from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
+from reconstruct.shapes.polyhedron import refine
 
 if TYPE_CHECKING:
     import trimesh

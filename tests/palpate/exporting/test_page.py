@@ -17,9 +17,8 @@ from devices.codecs import spacemouse
 from mechanics.effects.registry import effect
 from mechanics.model.files import read_model, write_model
 from mechanics.model.model import Model
-from palpate.exporting.page.band import force_band
 from palpate.exporting.page.button import button
-from palpate.exporting.page.contents import shown_modes
+from palpate.exporting.page.contents import force_band, shown_modes
 from palpate.exporting.page.packed import modes_of
 from render.fem.renderer import FemRenderer
 from render.press import Stroke, press, read_curve

@@ -16,7 +16,7 @@ import palpate as pp
 from mechanics.errors import FileError, OptionError, RecordingError
 from palpate import cli
 from palpate.importing.clocks import cross_correlated
-from palpate.importing.dates import seconds_of
+from palpate.importing.text import seconds_of
 
 RATE, TIP = 500.0, 0.004
 
