@@ -199,9 +199,9 @@ def _adapter_row(
     at = [n for n in named if n in right.get(largest, []) and n not in own]
     known = {e.name: e.gap_after_n for e in verdict.entries}
     limits = {e.name: e.detectable_n for e in verdict.entries if np.isfinite(e.detectable_n)}
-    least = max(
-        0.02 * rms(whole), min((limits[n] for n in right.get(largest, []) if n in limits), default=0.0)
-    )
+    seen = [limits[n] for n in right.get(largest, []) if n in limits]
+    # of a parameter half the noise must be seen, whatever the force (`--smallest`)
+    least = max(0.02 * rms(whole), min(seen or [0.5 * verdict.noise_n]))
     wrongly = set(named) if off < ALIKE else set(verdict.parts["parameters"].names)
     return {
         "truth": truth, "salt": salt, "sealed": sealed, "late_sensor": world.late, "sizes_n": sizes,

@@ -66,7 +66,8 @@ def flex_xml(
     damping_s: float = 0.01,
     skin_m: float = 1e-4,
 ) -> str:
-    """An object as a flex with a mocap sphere above its top."""
+    """An object as a flex with a mocap sphere above its top. Its cones of friction are elliptic: the usual
+    pyramids push back the less the greater the friction is, from 1 on, and at 10 not at all."""
     points = " ".join(f"{value:.6g}" for value in mesh.points.ravel())
     elements = " ".join(str(node) for node in mesh.tetrahedra.ravel())
     pins = " ".join(str(node) for node in np.flatnonzero(mesh.fixed))
@@ -75,7 +76,7 @@ def flex_xml(
     middle = 0.5 * (top + mesh.points.min(axis=0))
     contact = f'solref="{solref[0]:g} {solref[1]:g}" solimp="{impedance[0]:g} {impedance[1]:g} 0.001"'
     return f"""<mujoco>
-<option timestep="{timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG"/>
+<option timestep="{timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG" cone="elliptic"/>
 <size memory="1G"/>
 <worldbody>
 <body name="tip" mocap="true" pos="{middle[0]} {middle[1]} {top[2] + radius_m + 0.001}">

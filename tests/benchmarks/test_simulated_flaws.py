@@ -1,6 +1,10 @@
 """Flaws that are planted in a simulation's forces."""
 
+import numpy as np
+
+from benchmarks._adapter_flaws import CONTROLS, drawn_plan
 from benchmarks._simulated_flaws import FLAWS, MODULUS_PA, RADIUS_M, Block, simulated
+from benchmarks._simulated_scores import new_in
 
 
 def test_two_wrong_parameters_are_both_given():
@@ -8,3 +12,27 @@ def test_two_wrong_parameters_are_both_given():
     planted = [(flaws["stated_modulus"], 1.5), (flaws["stated_tip_radius"], 1.2)]
     _, given = simulated(Block(), planted, 0)
     assert given.modulus_pa == 1.5 * MODULUS_PA and given.radius_m == 1.2 * RADIUS_M
+
+
+def test_pairs_of_a_simulators_flaws_are_two_of_its_single_ones():
+    """Else what each changes alone would have to be run for them again."""
+    rng = np.random.default_rng(3)
+    plan = drawn_plan("drake", rng, 8, 5)
+    alone = [case[0] for case in plan if len(case) == 1]
+    assert len(alone) == 8 and "contact stiffness" not in {flaw.name for flaw, _ in alone}  # it has none
+    for pair in (case for case in plan if len(case) == 2):
+        assert all(each in alone for each in pair) and pair[0][0].name != pair[1][0].name
+    changed = CONTROLS["drake"].but({"damping_s": 0.05, "cells": 5})
+    assert changed.settings["damping_s"] == 0.05 and changed.cells == 5
+    assert changed.settings["sphere_radii"] == CONTROLS["drake"].settings["sphere_radii"]
+
+
+def test_what_a_simulator_has_of_its_own_is_no_answer_to_what_was_planted():
+    row = {
+        "sizes_n": {"damping": 0.1}, "right": {"damping": ["numerical_damping"]}, "own": ["mesh_stiffness"],
+        "named": ["mesh_stiffness", "numerical_damping"],
+    }  # fmt: skip
+    assert new_in(row) == ["numerical_damping"]
+    row |= {"right": {"damping": ["mesh_stiffness"]}}
+    assert new_in(row)[0] == "mesh_stiffness"
+    assert new_in({"sizes_n": {"time_step": 0.1}, "named": ["time_step"]}) == ["time_step"]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagnose.numerics.base import Signal, signal_of
+from diagnose.numerics.contact_stiffness import layer_factors
 from diagnose.numerics.registry import NAMES, numericals
 from diagnose.options import DiagnoseOptions
 from diagnose.other_simulator.advice import parameter_words
@@ -19,6 +20,7 @@ from diagnose.other_simulator.presses_to_run import spread_out
 from diagnose.other_simulator.result import PARTS, Mended
 from diagnose.other_simulator.stated import StatedForward, stated_of
 from diagnose.pipeline import diagnose
+from mechanics.contact.dent import grid
 from mechanics.effects.registry import NAMES as PHYSICAL
 from mechanics.errors import OptionError, RecordingError
 from mechanics.model.material import Material
@@ -160,6 +162,15 @@ def test_numerical_effects_have_names_of_their_own_and_do_nothing_at_their_ideal
         effect.act(settings, effect.ideal, forward)
         assert forward.predict(settings) == pytest.approx(plain, abs=1e-12), effect.name
         assert effect.advice
+
+
+def test_a_layer_of_springs_takes_its_share_of_the_depth_and_most_of_a_light_press():
+    x, share = grid(), 0.1
+    factor, stick = layer_factors(share)
+    dent = x[1:] * factor[1:] ** (2 / 3)  # the force goes with the dent's power 1.5
+    np.testing.assert_allclose(dent + share * np.sqrt(dent), x[1:], rtol=1e-9)
+    assert (np.diff(factor[1:]) > 0).all() and (stick > factor)[1:].all()
+    assert layer_factors(0.0)[0] == pytest.approx(1.0)
 
 
 def test_flicker_and_falling_through_show_in_the_samples(world):

@@ -57,6 +57,14 @@ def test_a_contact_without_balance_is_an_error_and_no_force(model, monkeypatch):
         pressed(model, "scikit-fem")
 
 
+def test_a_tip_that_sticks_to_mujocos_object_is_pushed_back(model, tmp_path, monkeypatch):
+    """Its cones give way where friction is a number as large as ten."""
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    sticks = pressed(model, "mujoco", friction=np.inf)
+    assert sticks.peak_force_n > 0.8 * pressed(model, "mujoco", friction=1.0).peak_force_n
+
+
 def test_mujoco_pushes_back_and_a_harder_contact_more(model, tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)  # it leaves its warnings in a file where it runs
