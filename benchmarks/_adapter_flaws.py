@@ -62,7 +62,7 @@ class Simulation:
 
     def but(self, change: dict[str, float]) -> Simulation:
         """The same with settings or fields changed."""
-        fields = {k: v for k, v in change.items() if k in _FIELDS}
+        fields: dict[str, Any] = {k: v for k, v in change.items() if k in _FIELDS}
         others = {k: v for k, v in change.items() if k not in _FIELDS}
         return dataclasses.replace(self, settings=self.settings | others, **fields)
 
