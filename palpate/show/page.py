@@ -167,9 +167,9 @@ class Page:
 
     def _once(self, picture: Any) -> tuple[bytes, str]:
         """A picture's PNG and its packed drawing, made once."""
-        for each, *found in self._drawn:
+        for each, png, drawing in self._drawn:
             if each is picture:
-                return found[0], found[1]
+                return png, drawing
         made = png_and_drawing(picture)
         self._drawn.append((picture, *made))
         return made

@@ -17,11 +17,10 @@ from render.surface.contact_surface import SurfaceArrays
 class FemParameters(NamedTuple):
     """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
 
-    far: (v, 3, 3) 1/m. curvature: (v,) 1/m, mean of the principal ones. bracing: (v,) 1/m (render.fem.field).
-    softness: (v,) of the material under a tip, 1 where its modulus is the global one. parents: (k, 3)
-    compliance nodes that interpolate over a triangle, -1 where fixed; parent_weights (k, 3, 3). blocks:
-    (n, n, 3, 3) 1/m, or of no size and factor: (n, 3, r) in their place, see SurfaceCompliance. table: dent
-    law.
+    far: (v, 3, 3) 1/m. curvature: (v,) 1/m, mean of the principal ones. bracing: (v,) 1/m (Field). softness:
+    (v,) of the material under a tip, 1 where its modulus is the global one. parents: (k, 3) compliance nodes
+    that interpolate over a triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m, or
+    of no size and factor: (n, 3, r) in their place, see SurfaceCompliance. table: dent law.
     young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each. edition: (1,) int64,
     that of the table.
     """

@@ -248,7 +248,7 @@ def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_wa
 
 def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeypatch):
     """A field beside a block once ended 1.8 m below the support."""
-    from reconstruct.steps.s4_surface import surface as module
+    from reconstruct.shapes import choice as module
 
     evidence, _ = touch(phantom_truth("cylinder"), 0)
     honest, tried = module.draw, []
