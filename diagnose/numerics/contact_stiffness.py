@@ -18,9 +18,6 @@ from mechanics.effects.base import Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 
-_TYPICAL = 0.2
-"""Of the tip's radius: the dent at which the layer's stiffness is told as one spring's."""
-
 
 def layer_factors(share: float) -> tuple[np.ndarray, np.ndarray]:
     """Factors on a dent's normal force and stick at `mechanics.contact.dent.grid()`, where a layer of that B
@@ -38,13 +35,10 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
 
 def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     assert isinstance(scene, Forward), "numerical effects act on the presses of a diagnosis"
-    radius, plane = scene.tip_radius, modulus_pa / (1 - scene.ideal(modulus_pa).nu ** 2)
-    # of the layer: F / (s pi R d) over F
-    layer = 0.75 * values[1] / (plane * radius * _TYPICAL)
-    return {
-        "stiffness_n_per_m": float(1 / max(values[0] + layer, 1e-9)),
-        "layer_n_per_m3": float(4 * plane / (3 * np.pi * radius * max(values[1], 1e-6))),
-    }
+    plane = modulus_pa / (1 - scene.ideal(modulus_pa).nu ** 2)
+    # springs side by side are told as one by what they give where presses are deepest: 1 / (s pi R d)
+    layer = 0.75 * values[1] / (plane * float(np.median(scene.touches.deepest)))
+    return {"stiffness_n_per_m": float(1 / max(values[0] + layer, 1e-9))}
 
 
 EFFECT = NumericalEffect(
@@ -57,10 +51,7 @@ EFFECT = NumericalEffect(
         Parameter("compliance_m_per_n", "m/N", 0.0, 0.05, 0.0, (2e-4, 1e-3, 0.0, 0.0), 2e-5),
         Parameter("layer", "1", 0.0, 2.0, 0.0, (0.0, 0.0, 0.05, 0.3), 0.005),
     ),
-    keys={
-        "stiffness_n_per_m": Key(low=1.0, high=1e12, unit="N/m", required=True),
-        "layer_n_per_m3": Key(low=1.0, high=1e15, unit="N/m^3"),
-    },
+    keys={"stiffness_n_per_m": Key(low=1.0, high=1e12, unit="N/m", required=True)},
     report=_report,
     change=_change,
     advice="raise the contact stiffness (a penalty of ten times the object's own stiffness under the tip "

@@ -89,6 +89,21 @@ def test_what_changes_the_force_most_is_named_first_whatever_part_it_is_in(world
     assert sizes[result.effects[0]] < sizes[result.effects[1]]
 
 
+def test_a_tip_held_by_a_spring_is_contact_stiffness_with_that_springs(world):
+    """Springs side by side are looked for too, and take nothing of it."""
+    real = world[2].forward
+    forward = StatedForward(real.touches, real.places, stated_of({}, world[1]))
+    settings = forward.ideal(1.0)
+    settings.tool_compliance += 1e-3
+    local, frame = forward.predict(settings), real.places.frame[real.touches.press]
+    force = Forces(real.touches.t, np.einsum("nij,ni->nj", frame, local), "a simulator")
+    asked = Asked(force, stated_of({}, world[1]), OWN_CLOCK)
+    result = diagnose_simulated(*world[:2], asked, FAST, reality=world[2])
+    assert result.effects == ("contact_stiffness",)
+    found = next(e for e in result.entries if e.name == "contact_stiffness")
+    assert found.parameters["stiffness_n_per_m"] == pytest.approx(1000.0, rel=0.06)
+
+
 def test_what_is_named_first_does_not_depend_on_what_stands_beside_it(world):
     """A mesh too stiff by 0.7 outweighs a modulus too small by 0.55, though in a simulation that has both the
     mesh adds but 0.7 of 0.45."""
