@@ -199,7 +199,7 @@ def as_the_ghost_says(driven: Driven, guide: Guide) -> None:
     assert s.point is not None and s.normal is not None
     if np.hypot(*s.normal[:2]) > 0.15:
         driven.look_from(float(np.arctan2(s.normal[1], s.normal[0])))
-    driven.look_down(float(np.clip(np.arcsin(s.normal[2]), 0.3, 1.2)))
+    driven.look_down(float(np.arcsin(np.clip(s.normal[2], np.sin(0.3), np.sin(1.2)))))
     driven.window.pointer.go_deep(1e3 * s.depth_m)
     driven.mouse_at(s.point)
     driven.wait(1.5)
