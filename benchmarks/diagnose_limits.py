@@ -63,7 +63,7 @@ def _model(recording: Recording, path: Path | None) -> Model:
 
 
 def _support(recording: Recording, model: Model) -> dict[str, float]:
-    from diagnose.instrument.rigid import rigid_of
+    from diagnose.instrument.support_readings import rigid_of
 
     normal = model.support.normal
     found = rigid_of(recording, model.presses, normal)
@@ -92,7 +92,7 @@ def _limits(recording: Recording, model: Model) -> dict[str, float]:
     from diagnose.options import AttributionOptions, NuisanceOptions
     from diagnose.search.detectable import detectable
     from diagnose.search.evidence import Search
-    from diagnose.search.shape import site_stiffness_sd
+    from diagnose.search.site_stiffness import site_stiffness_sd
     from diagnose.search.starts import misfit_of
     from mechanics.effects.base import Role
     from mechanics.effects.registry import effects

@@ -18,9 +18,9 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.compliance.compliance import ComplianceOptions
 from mechanics.compliance.patch import PatchSampler
 from mechanics.compliance.sites import LoadPatch, patch_loads, touch_sites
+from mechanics.compliance.stored_compliance import ComplianceOptions
 from mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.contact.touch import TouchedPlaces, touch_forces
 from mechanics.elastic.solver import Solver

@@ -16,7 +16,7 @@ from typing import Literal, Protocol, Self, runtime_checkable
 import numpy as np
 
 from mechanics.errors import DeviceError
-from mechanics.state import TipState
+from mechanics.tip_state import TipState
 
 Clock = Callable[[], float]
 """Seconds, monotonic; `host_clock` for real devices, a fake one in tests and headless runs."""

@@ -32,7 +32,7 @@ from devices.base import (
     host_clock,
 )
 from mechanics.errors import DeviceError
-from mechanics.state import IDENTITY_QUATERNION, TipState
+from mechanics.tip_state import IDENTITY_QUATERNION, TipState
 
 POLL_S = 0.001
 FIRST_RETRY_S = 0.1

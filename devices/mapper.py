@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from mechanics.bounds import FARTHEST_M, FASTEST_M_PER_S
 from mechanics.errors import OptionError
 from mechanics.options import check_ranges, option
-from mechanics.state import TipState
+from mechanics.tip_state import TipState
 
 LONGEST_RATE_STEP_S = 0.05
 _AXES = {"x": 0, "y": 1, "z": 2}

@@ -19,7 +19,7 @@ from devices.channel import PoseChannel
 from devices.impedance import HandImpedance
 from mechanics.errors import DeviceError
 from mechanics.options import option
-from mechanics.state import TipState
+from mechanics.tip_state import TipState
 
 SPEC = DeviceSpec(
     name="mouse",

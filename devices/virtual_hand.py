@@ -25,7 +25,7 @@ from devices.impedance import HandImpedance, follow
 from devices.intention import FreeExploration, Intention
 from mechanics.errors import DeviceError
 from mechanics.options import check_ranges, option
-from mechanics.state import TipState
+from mechanics.tip_state import TipState
 
 SPEC = DeviceSpec(
     name="simulated",

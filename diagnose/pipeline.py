@@ -9,7 +9,7 @@ import numpy as np
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import REACH_M, reached, touches_of, unobservable_effects
 from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.offsets import (
+from diagnose.instrument.instrument_effects import (
     find_instrument_offsets,
     read_sideways,
     ruled_out,
@@ -17,11 +17,11 @@ from diagnose.instrument.offsets import (
     with_move,
 )
 from diagnose.instrument.retraced import move_of
-from diagnose.instrument.rigid import rigid_of
+from diagnose.instrument.support_readings import rigid_of
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from diagnose.search.attribution import attribute
 from diagnose.search.evidence import Search
-from diagnose.search.shape import site_stiffness_sd
+from diagnose.search.site_stiffness import site_stiffness_sd
 from diagnose.search.starts import misfit_of
 from diagnose.verdict.answer import Findings
 from diagnose.verdict.conclusion import conclude

@@ -15,7 +15,7 @@ from mechanics.shape.tetmesh import TetMesh
 from reconstruct.geometry.in_device_frame import Placed
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
-from reconstruct.steps.s2_base.outline import BoundaryOptions
+from reconstruct.steps.s2_base.boundary import BoundaryOptions
 from reconstruct.steps.s3_contacts.contacts import ContactOptions
 from reconstruct.steps.s4_surface.casting import CastPoints
 from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions

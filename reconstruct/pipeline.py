@@ -31,7 +31,7 @@ from reconstruct.geometry.known_shape import place
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.methods import BY_NAME, Body, Fitted, Method
 from reconstruct.methods import ReconstructOptions as ReconstructOptions
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 from reconstruct.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.compliance import compliance_file
+from mechanics.compliance.stored_compliance import compliance_file
 from mechanics.compliance.surface_compliance import SurfaceCompliance
 from mechanics.disk.store import write_arrays
 from mechanics.disk.writing import atomic_folder
@@ -76,7 +76,7 @@ def unpack(archive: Path, folder: Path) -> None:
 
 
 def pack(folder: Path, archive: Path, compliance: SurfaceCompliance, key: str) -> None:
-    """Make the archive of a MODEL folder and its compliance of that key (mechanics.compliance.compliance)."""
+    """Make the archive of a MODEL folder and its compliance of that key (`stored_compliance`)."""
     own = [path for path in sorted(folder.iterdir()) if path.suffix not in (".bin", ".cache")]
     files = {path.name: path.read_bytes() for path in (*own, folder / "presses.bin")}
     files[f"compliance-{key}.npz"] = _halved(compliance)

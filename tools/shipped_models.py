@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.compliance import compliance_key, load_or_condense
+from mechanics.compliance.stored_compliance import compliance_key, load_or_condense
 from mechanics.model.files import write_model
 from mechanics.model.model import Model
 from render.fem.renderer import FemRenderer

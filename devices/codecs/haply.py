@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mechanics.errors import DeviceError
-from mechanics.state import IDENTITY_QUATERNION
+from mechanics.tip_state import IDENTITY_QUATERNION
 
 BASIS = "XYZ"
 GRIPS = ("wireless_verse_grip", "verse_grip")

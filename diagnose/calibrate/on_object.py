@@ -16,13 +16,13 @@ import numpy as np
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
 from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.offsets import InstrumentOffsets, find_instrument_offsets
-from diagnose.instrument.rigid import rigid_of
+from diagnose.instrument.instrument_effects import InstrumentOffsets, find_instrument_offsets
+from diagnose.instrument.support_readings import rigid_of
 from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.evidence import Search
 from diagnose.search.fit import Fit, bounds_of
 from diagnose.search.intervals import covariance
-from diagnose.search.shape import site_stiffness_sd
+from diagnose.search.site_stiffness import site_stiffness_sd
 from mechanics.effects.backlash import EFFECT as PLAY
 from mechanics.effects.base import Effect
 from mechanics.effects.finite_strain import EFFECT as FINITE

@@ -21,7 +21,7 @@ from mechanics.gaussian import squared_exponential
 from mechanics.options import option
 from mechanics.shape.tetmesh import vertex_normals
 from reconstruct.shapes.points import farthest_points
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import CORRELATION_M
 

@@ -24,7 +24,7 @@ from mechanics.progress import Clock
 from mechanics.quantities import USUAL_POISSON_RATIO
 from mechanics.recording.recording import Recording, write_recording
 from mechanics.shape.nearest import distance
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 
 Order = Callable[[np.ndarray, np.ndarray, np.ndarray, np.random.Generator], int]

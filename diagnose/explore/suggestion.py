@@ -16,7 +16,7 @@ from diagnose.explore.modulus import log_sd
 from diagnose.explore.separating import RIGID_S, separations, support_gain
 from diagnose.explore.state import State
 from diagnose.explore.weighing import Weighing
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s7_modulus.modulus import ModulusOptions
 
 FAR_FROM = 3.0

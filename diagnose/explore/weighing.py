@@ -16,13 +16,13 @@ from diagnose.explore.forms import Act, balls, forms_of, softer
 from diagnose.forward.prediction import Forward
 from diagnose.forward.touches import reached, touches_of
 from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.offsets import find_instrument_offsets
-from diagnose.instrument.rigid import rigid_of
+from diagnose.instrument.instrument_effects import find_instrument_offsets
+from diagnose.instrument.support_readings import rigid_of
 from diagnose.options import NuisanceOptions
 from diagnose.search.descent import fit
 from diagnose.search.fit import Fit, settings_of
 from diagnose.search.gaps import modulus_share
-from diagnose.search.shape import site_stiffness_sd
+from diagnose.search.site_stiffness import site_stiffness_sd
 from diagnose.search.starts import first_touches
 from diagnose.search.whiten import Whitener
 from mechanics.compliance.pressed_places import Places

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from diagnose.instrument.jackknife import all_but_one, covariance
-from diagnose.instrument.rigid import KINDS, on_support
+from diagnose.instrument.support_readings import KINDS, on_support
 from mechanics.frames import tangents
 from mechanics.presses.table import Presses
 from mechanics.recording.recording import Recording

@@ -8,12 +8,12 @@ import numpy as np
 
 from diagnose.forward.prediction import Forward
 from diagnose.instrument.free_air import FreeAir
-from diagnose.instrument.offsets import InstrumentOffsets
+from diagnose.instrument.instrument_effects import InstrumentOffsets
 from diagnose.search.attribution import Attribution
 from diagnose.search.evidence import Search
 from diagnose.search.fit import Fit, settings_of
 from diagnose.search.gaps import modulus_share
-from diagnose.search.shape import heterogeneity, site_factors
+from diagnose.search.site_stiffness import heterogeneity, site_factors
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect, effects
 

@@ -11,7 +11,7 @@ from diagnose.search.detectable import detectable
 from diagnose.search.gaps import closed_share, gap
 from diagnose.search.intervals import parameter_intervals
 from diagnose.search.rivals import alike
-from diagnose.search.shape import repeat_scatter
+from diagnose.search.site_stiffness import repeat_scatter
 from diagnose.verdict.answer import Answer, Findings, answer_of, stated_gap
 from diagnose.verdict.corrections import how_named, sureness, widened
 from diagnose.verdict.held_out import Gaps, held_out_gaps, without_what_makes_it_worse

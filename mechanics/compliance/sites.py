@@ -12,8 +12,8 @@ from mechanics.compliance.compression import own_blocks
 from mechanics.compliance.near_field import contact_width, sharpening
 from mechanics.compliance.patch import half_space_compliance, usual_width
 from mechanics.contact.edges import edge_law
+from mechanics.elastic.held_base import BaseHold
 from mechanics.elastic.solver import Solver
-from mechanics.elastic.support import BaseHold
 from mechanics.errors import MeshError
 from mechanics.frames import local_frames
 from mechanics.model.material import Ball

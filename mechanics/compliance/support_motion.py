@@ -20,7 +20,7 @@ from mechanics.compliance.far_field import energy_fields
 from mechanics.compliance.pressed_places import Places
 from mechanics.elastic.elasticity import stiffness, triangle_mass
 from mechanics.elastic.floor import resting
-from mechanics.elastic.support import base_triangles
+from mechanics.elastic.held_base import base_triangles
 from mechanics.frames import local_frames
 from mechanics.shape.tetmesh import EDGES, TetMesh
 

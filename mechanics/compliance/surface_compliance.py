@@ -26,8 +26,8 @@ from mechanics.compliance.sites import (
     touch_solver,
 )
 from mechanics.elastic.floor import carried_by_floor
+from mechanics.elastic.held_base import BaseHold
 from mechanics.elastic.solver import Solver
-from mechanics.elastic.support import BaseHold
 from mechanics.model.material import Ball
 from mechanics.model.moduli import with_balls
 from mechanics.progress import Progress, silent

@@ -82,7 +82,7 @@ class Effect:
     law: what it does along the path of a touch; `touch` sets its numbers.
     apply(model, keys): the model with the effect; None: it is not rendered. `unchanged` where the law reads
     the keys.
-    hold(keys, young_modulus_pa): how the base is held, as fields of mechanics.elastic.support.BaseHold.
+    hold(keys, young_modulus_pa): how the base is held, as fields of mechanics.elastic.held_base.BaseHold.
     correct(recording, keys): the recording without it; None: it cannot be taken off.
     read_as: place among the corrections of a reading; what the instrument does last is taken off first.
     hints: what only the search of a diagnosis needs.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.effects.registry import effects as known_effects
-from mechanics.elastic.support import BaseHold
+from mechanics.elastic.held_base import BaseHold
 
 
 def base_hold(

@@ -12,8 +12,8 @@ from scipy.linalg import solve
 from scipy.spatial import cKDTree
 
 from mechanics.compliance.patch import PatchSampler
+from mechanics.elastic.held_base import base_triangles
 from mechanics.elastic.solver import Solver
-from mechanics.elastic.support import base_triangles
 
 _ROUNDS = 12
 _COLUMNS = 96

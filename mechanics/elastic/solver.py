@@ -9,7 +9,7 @@ import scipy.sparse.linalg as spla
 
 from mechanics.elastic import pardiso
 from mechanics.elastic.elasticity import stiffness
-from mechanics.elastic.support import BaseHold
+from mechanics.elastic.held_base import BaseHold
 from mechanics.errors import MeshError, OptionError
 from mechanics.shape.tetmesh import TetMesh
 

@@ -8,7 +8,7 @@ MODEL/shape.vtp        the object's surface itself, where it is known (mechanics
 MODEL/presses.bin      the table of presses, samples and all (mechanics.presses.table)
 MODEL/palpations.csv   one row a palpation, for people
 MODEL/surface.vtp      what a tip meets, written by the shell (render.surface.felt_surface), keyed by content
-MODEL/compliance-*.bin the cached compliance (mechanics.compliance.compliance), keyed by content"""
+MODEL/compliance-*.bin the cached compliance (mechanics.compliance.stored_compliance), keyed by content"""
 
 from __future__ import annotations
 

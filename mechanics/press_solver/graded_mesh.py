@@ -9,7 +9,7 @@ import numpy as np
 
 from mechanics.elastic.elasticity import shape_derivatives
 from mechanics.errors import MeshError
-from mechanics.press_solver.felt_surface import FeltSurface
+from mechanics.press_solver.curved_faces import FeltSurface
 from mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
 
 GAUSS = np.full((4, 4), 0.1381966011250105)

@@ -9,9 +9,9 @@ import numpy as np
 from mechanics.errors import OptionError
 from mechanics.press_solver.body import Body, BodyMaterial
 from mechanics.press_solver.contact import SphereContact
+from mechanics.press_solver.curved_faces import FeltSurface
 from mechanics.press_solver.equilibrium import Path
 from mechanics.press_solver.even_surface import even_surface
-from mechanics.press_solver.felt_surface import FeltSurface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
 from mechanics.press_solver.settling import Settling
 from mechanics.shape.tetmesh import TetMesh

@@ -8,8 +8,8 @@ from pathlib import Path
 from mechanics.disk.reading import no_file
 from mechanics.disk.surface_files import is_surface_file
 from mechanics.errors import RecordingError
+from palpate.importing.machine_tests import is_chiaro, kind_of
 from palpate.importing.mapping import Said, find_columns
-from palpate.importing.specimens import is_chiaro, kind_of
 from palpate.importing.tables import TEXT_SUFFIXES, read_tables
 from render.press import COLUMNS as PRESS_COLUMNS
 

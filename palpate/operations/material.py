@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
-from palpate.importing.specimens import KINDS
+from palpate.importing.machine_tests import KINDS
 from palpate.operations._declare import Call, operand, operation
 from palpate.operations._run import answer
 from palpate.operations._shared import (
@@ -86,7 +86,7 @@ def material(asked: MaterialOperands, call: Call) -> Material:
 def _made(asked: MaterialOperands, call: Call) -> Material:
     from diagnose.specimen.material import material_of
     from palpate.importing.curve_meaning import SaidOfCurves
-    from palpate.importing.specimens import read_tests
+    from palpate.importing.machine_tests import read_tests
 
     tests = read_tests(
         asked.files,

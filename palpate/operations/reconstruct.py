@@ -21,7 +21,7 @@ from palpate.output import Output, progress_bar
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.pipeline import ReconstructOptions
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
-from reconstruct.steps.s2_base.outline import BoundaryOptions
+from reconstruct.steps.s2_base.boundary import BoundaryOptions
 from reconstruct.steps.s3_contacts.contacts import ContactOptions
 from reconstruct.steps.s4_surface.surface import SurfaceOptions
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions
@@ -69,7 +69,7 @@ class ReconstructOperands:
 
 
 def _answer(result: Reconstruction, asked: ReconstructOperands, out: Output) -> int:
-    from mechanics.compliance.compliance import load_or_condense
+    from mechanics.compliance.stored_compliance import load_or_condense
     from mechanics.model.files import read_model
 
     out.say(*result.lines(), f"written to {asked.save}")

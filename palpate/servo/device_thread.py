@@ -20,7 +20,7 @@ from devices import mapper
 from devices.base import LONGEST_HOLD_S, ForceSink
 from devices.mapper import Mapping
 from mechanics.errors import PalpateError
-from mechanics.state import TipState
+from mechanics.tip_state import TipState
 from palpate.servo.clock import COMPILED
 from palpate.servo.layout import DEADLINE, ENABLE, STOP
 from palpate.servo.loop import ServoLoop

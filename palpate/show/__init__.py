@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
 from mechanics.result import Result, present_by
-from palpate.loading import loaded_whole
+from palpate.whole_imports import loaded_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pyvista
 
-from palpate.window.board import ACCENT, GREY, SECOND
+from palpate.window.last_seconds import Trace
 from palpate.window.lettering import set_type
-from palpate.window.trace import Trace
+from palpate.window.widgets import ACCENT, GREY, SECOND
 
 LEAST_N, LEAST_MM = 0.5, 2.0
 """What the axes reach at least."""

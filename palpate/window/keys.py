@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container
 from dataclasses import dataclass
 
-from palpate.window.board import Item, Row
+from palpate.window.widgets import Item, Row
 
 
 @dataclass(frozen=True)

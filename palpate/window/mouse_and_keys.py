@@ -13,12 +13,12 @@ import pyvista
 from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
-from palpate.window.board import Board
 from palpate.window.game import Game
 from palpate.window.keys import KEYS
 from palpate.window.orbit import Orbit
 from palpate.window.pointer import Pointer
 from palpate.window.session import MODULUS_STEP, TouchSession
+from palpate.window.widgets import Board
 from scenes.phantoms import Region
 
 INCLUSION_RADIUS_M = 0.008

@@ -9,12 +9,12 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from palpate.window.board import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
 from palpate.window.frames import Frame
 from palpate.window.keys import KEYS, help_rows, shown
 from palpate.window.mouse_and_keys import Controlled, Controls
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
 from palpate.window.session import FRICTIONS, MODULUS_STEP
+from palpate.window.widgets import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
 from render.registry import names
 from scenes.scene import Scene
 

@@ -12,11 +12,11 @@ from mechanics.frames import tangents
 from mechanics.model.model import Model
 from mechanics.shape.tetmesh import vertex_normals
 from palpate.window import shadow
-from palpate.window.board import INK
 from palpate.window.frames import Frame, View
 from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
+from palpate.window.widgets import INK
 from render.base import Renderer
 from render.press import BESIDE
 from render.support import support_plane

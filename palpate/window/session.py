@@ -19,17 +19,17 @@ import numpy as np
 
 from devices.mapper import Mapping
 from devices.registry import DeviceChoice, spec_of
-from mechanics.compliance.compliance import load_or_condense
+from mechanics.compliance.stored_compliance import load_or_condense
 from mechanics.model.model import Model
 from mechanics.progress import Progress, silent
 from palpate.servo import Servo, ServoOptions, ServoReport, ServoSnapshot
 from palpate.servo.started import StartedServo
-from palpate.window.drawn import DrawnRenderers
 from palpate.window.frames import Frame, View
 from palpate.window.inclusion import InclusionMover
+from palpate.window.last_seconds import Trace
 from palpate.window.recording import SessionRecording
 from palpate.window.second_renderer import Beside
-from palpate.window.trace import Trace
+from palpate.window.window_renderers import DrawnRenderers
 from palpate.window.worker import Worker
 from render.base import Renderer
 from render.effects import rendered_touch

@@ -14,7 +14,7 @@ from vtkmodules.vtkInteractionStyle import vtkInteractorStyleUser
 from mechanics.errors import PalpateError
 from mechanics.progress import Progress
 from mechanics.recording.recording import read_recording
-from palpate.window.board import GREY, HINT, PAPER, Board, Item
+from palpate.window.widgets import GREY, HINT, PAPER, Board, Item
 from scenes.embedded import embedded_recording
 from scenes.phantoms import phantom
 from scenes.scene import Scene

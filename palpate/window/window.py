@@ -19,7 +19,6 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 from devices.channel import PoseChannel
 from mechanics.disk.writing import PNG, atomic_file
 from palpate.window.axes import Axes
-from palpate.window.board import PAPER, Board, Item
 from palpate.window.charts import LiveCharts
 from palpate.window.frames import Frame, View, level
 from palpate.window.game import Game
@@ -32,6 +31,7 @@ from palpate.window.picture import ObjectPicture
 from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
+from palpate.window.widgets import PAPER, Board, Item
 from scenes.phantoms import Region
 from scenes.scene import Scene
 

@@ -12,7 +12,7 @@ from mechanics.frames import support_axes
 from mechanics.recording.recording import Recording
 from mechanics.shape.tetmesh import TetMesh
 from reconstruct.geometry.known_base import base_of_rim
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import PoseError
 

@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.errors import ContactError
 from mechanics.frames import tangents
 from mechanics.model.model import Model
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 
 
 def base_of_model(model: Model, tip_radius_m: float) -> Boundary:

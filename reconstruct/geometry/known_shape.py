@@ -32,7 +32,7 @@ from reconstruct.geometry.slab import place_slab
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.shapes.coarse_drawing import decimated
 from reconstruct.shapes.polyhedron import refine
-from reconstruct.steps.s2_base.outline import BoundaryOptions
+from reconstruct.steps.s2_base.boundary import BoundaryOptions
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import PoseError

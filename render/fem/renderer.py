@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.compliance.compliance import load_or_condense
 from mechanics.compliance.near_field import surface_softness
 from mechanics.compliance.patch import half_space_compliance
 from mechanics.compliance.sites import principal_curvatures
+from mechanics.compliance.stored_compliance import load_or_condense
 from mechanics.compliance.surface_compliance import SurfaceCompliance
 from mechanics.contact.edges import edge_law
 from mechanics.errors import OptionError

@@ -8,7 +8,7 @@ import pytest
 from devices import mapper
 from devices.mapper import MapperOptions, Mapping
 from mechanics.errors import OptionError
-from mechanics.state import TipState
+from mechanics.tip_state import TipState
 
 
 def state(time_s: float, position=(0, 0, 0), velocity=(0, 0, 0), buttons: int = 0, **more) -> TipState:

@@ -12,7 +12,7 @@ from diagnose.apply import corrected
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
 from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.offsets import find_instrument_offsets
+from diagnose.instrument.instrument_effects import find_instrument_offsets
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
 from reconstruct.steps.s3_contacts.contacts import explore

@@ -16,11 +16,11 @@ import pytest
 import mechanics.compliance.surface_compliance as made
 from diagnose.apply import with_effects
 from diagnose.forward.prediction import Forward
-from mechanics.compliance.compliance import load_or_condense
 from mechanics.compliance.far_field import energy_fields, far_with_weights
 from mechanics.compliance.near_field import surface_softness
 from mechanics.compliance.pressed_places import solve_places
 from mechanics.compliance.sites import touch_solver
+from mechanics.compliance.stored_compliance import load_or_condense
 from mechanics.effects.registry import effect, effects
 from mechanics.frames import tangents
 from mechanics.presses.making import of_paths

@@ -7,8 +7,8 @@ import pytest
 
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
-from diagnose.instrument.offsets import seen_play
-from diagnose.instrument.rigid import Rigid
+from diagnose.instrument.instrument_effects import seen_play
+from diagnose.instrument.support_readings import Rigid
 from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.attribution import Attribution, attribute
 from diagnose.search.evidence import Search

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
-from diagnose.instrument.offsets import InstrumentOffsets, ruled_out, with_move
+from diagnose.instrument.instrument_effects import InstrumentOffsets, ruled_out, with_move
 from diagnose.instrument.retraced import Move, move_of
-from diagnose.instrument.rigid import Rigid
+from diagnose.instrument.support_readings import Rigid
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from diagnose.pipeline import diagnose
 from diagnose.search.evidence import Search

@@ -19,8 +19,8 @@ from mechanics.compliance.support_motion import (
     loosened,
     support_motion,
 )
+from mechanics.elastic.held_base import BaseHold
 from mechanics.elastic.solver import Solver
-from mechanics.elastic.support import BaseHold
 from mechanics.frames import tangents
 from mechanics.shape.refine import typical_edge
 

@@ -16,7 +16,7 @@ from diagnose.search.evidence import Search
 from diagnose.search.intervals import covariance, parameter_intervals
 from diagnose.search.leave_one_out import Candidate, held_out
 from diagnose.search.naming import Score
-from diagnose.search.shape import repeat_scatter
+from diagnose.search.site_stiffness import repeat_scatter
 from diagnose.verdict.held_out import deepest, held_out_by_refit, neighbours
 from mechanics.effects.registry import effect
 from mechanics.effects.time_delay import EFFECT as DELAY

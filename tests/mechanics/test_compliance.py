@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks._condensation import condense
-from mechanics.compliance.compliance import ComplianceOptions
 from mechanics.compliance.sites import LoadPatch, touch_sites
+from mechanics.compliance.stored_compliance import ComplianceOptions
 from mechanics.compliance.surface_compliance import patch_blocks, surface_compliance
 from mechanics.elastic.pardiso import available
 from mechanics.elastic.solver import Solver

@@ -6,8 +6,8 @@ import pytest
 from mechanics.contact.dent import dent_law
 from mechanics.errors import OptionError
 from mechanics.press_solver.condensing import SuperLuFactor, partial_factor
+from mechanics.press_solver.curved_faces import FeltSurface
 from mechanics.press_solver.even_surface import even_surface
-from mechanics.press_solver.felt_surface import FeltSurface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
 from mechanics.press_solver.press import PressOptions, PressSolver
 from mechanics.press_solver.solid import Solid

@@ -8,7 +8,7 @@ import os
 import numpy as np
 import pytest
 
-from mechanics.compliance.compliance import load_or_condense
+from mechanics.compliance.stored_compliance import load_or_condense
 from mechanics.disk.store import content_key, load_or_build, read_arrays, write_arrays
 from mechanics.errors import CacheError
 from mechanics.model.files import read_model, write_model

@@ -8,8 +8,8 @@ import pytest
 from mechanics.compliance.sites import touch_sites
 from mechanics.effects.hold import base_hold
 from mechanics.elastic.elasticity import triangle_mass
+from mechanics.elastic.held_base import BaseHold, base_triangles
 from mechanics.elastic.solver import Solver
-from mechanics.elastic.support import BaseHold, base_triangles
 from mechanics.errors import OptionError
 
 UP = np.array([0.0, 0.0, 1.0])

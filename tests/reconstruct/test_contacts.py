@@ -222,7 +222,7 @@ def test_a_soft_object_pressed_shallowly_keeps_its_presses():
 
 def test_a_foot_traced_in_straight_pieces_with_a_bounce_is_one_phase():
     """One straight side alone tells no plane, and a bounce of 20 ms ends no tracing."""
-    from reconstruct.steps.s2_base.tracing import find_interval
+    from reconstruct.steps.s2_base.tracing_interval import find_interval
 
     rate, rng = 1000, np.random.default_rng(5)
     corners = np.array([[0, 0], [0.06, 0], [0.06, 0.06], [0, 0.06], [0, 0]])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.compliance.compliance import compliance_file, compliance_key, load_or_condense
+from mechanics.compliance.stored_compliance import compliance_file, compliance_key, load_or_condense
 from mechanics.errors import FileError, PalpateWarning
 from mechanics.model.files import read_model, write_model
 from mechanics.model.model import Model

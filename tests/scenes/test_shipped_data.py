@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.compliance.compliance import compliance_file, compliance_key, load_or_condense
 from mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
+from mechanics.compliance.stored_compliance import compliance_file, compliance_key, load_or_condense
 from mechanics.model.model import Model
 from mechanics.recording.recording import read_recording
 from reconstruct.pipeline import reconstruct
@@ -49,7 +49,7 @@ def test_nothing_is_computed_for_a_first_touch(model: Model, monkeypatch: pytest
 
     assert model.path is not None
     assert (model.path / compliance_file(compliance_key(model))).is_file(), MAKE
-    monkeypatch.setattr("mechanics.compliance.compliance.surface_compliance", none)
+    monkeypatch.setattr("mechanics.compliance.stored_compliance.surface_compliance", none)
     monkeypatch.setattr("render.surface.felt_surface.local_stiffness", none)
     assert felt_surface(model).stiffness_from == PRESSES, MAKE
     with_own_stiffness(FemRenderer(model))

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.timing import table
 from devices.registry import DeviceChoice
 from diagnose.apply import with_effects
-from mechanics.compliance.compliance import load_or_condense
+from mechanics.compliance.stored_compliance import load_or_condense
 from mechanics.model.files import read_model, write_model
 from mechanics.model.model import Model
 from mechanics.recording.recording import write_recording

@@ -20,7 +20,7 @@ from mechanics.recording.recording import Recording
 from reconstruct.shapes.evidence import LEAST_TOUCHES
 from reconstruct.steps.s1_filter.low_pass import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.steps.s1_filter.signals import Signals, filtered_of
-from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions
+from reconstruct.steps.s2_base.boundary import Boundary, BoundaryOptions
 from reconstruct.steps.s3_contacts.cycles import free_air_seen
 from reconstruct.steps.s3_contacts.first_touch import (
     ContactSpans,

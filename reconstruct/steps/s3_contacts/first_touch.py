@@ -16,8 +16,8 @@ from mechanics.errors import ContactError, LoudAirError
 from mechanics.recording.recording import Recording
 from mechanics.recording.segments import ON_SUPPORT, Segment, runs
 from reconstruct.steps.s1_filter.signals import Filtered, Signals, stated_tracing
-from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions, find_boundary
-from reconstruct.steps.s2_base.tracing import find_interval
+from reconstruct.steps.s2_base.boundary import Boundary, BoundaryOptions, find_boundary
+from reconstruct.steps.s2_base.tracing_interval import find_interval
 from reconstruct.steps.s3_contacts.cycles import Piece, cycles, found_cycles
 from reconstruct.steps.s3_contacts.force_delay import Delay, delay_by_places
 from reconstruct.steps.s3_contacts.on_support import on_it, recognised, stated

@@ -15,7 +15,7 @@ from mechanics.errors import ContactError
 from mechanics.presses.table import Presses
 from mechanics.recording.segments import Segment
 from mechanics.robust import spread_about_zero
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s3_contacts.contact_law import contact_law, fit_offset, fit_rise
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s3_contacts.on_support import on_it

@@ -10,7 +10,7 @@ from mechanics.presses.table import Presses
 from mechanics.recording.recording import Recording
 from mechanics.recording.segments import ON_SUPPORT
 from reconstruct.steps.s1_filter.signals import Signals
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 
 _SLID = 2.0
 """Tip radii: what stays within is pressed, what goes farther slides."""

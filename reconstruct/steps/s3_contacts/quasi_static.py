@@ -21,7 +21,7 @@ from mechanics.presses.repeats import sites_of
 from mechanics.presses.table import Presses
 from mechanics.recording.recording import Recording
 from mechanics.robust import spread_about_zero
-from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from devices.mapper import Mapping
-from mechanics.state import TipState
+from mechanics.tip_state import TipState
 from palpate.servo.device_thread import DeviceThread
 from palpate.servo.layout import total_bytes, views
 from palpate.servo.tick import IN_CALIBRATED, IN_SEQUENCE, tick_arrays

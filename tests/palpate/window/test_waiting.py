@@ -7,8 +7,8 @@ import threading
 import pytest
 
 from mechanics.errors import SceneError
-from palpate.window.board import HINT, PAPER
 from palpate.window.waiting import ClosedError, WaitingWindow
+from palpate.window.widgets import HINT, PAPER
 from scenes.scene import load_scene
 
 from ...support.waiting import PATIENCE_S

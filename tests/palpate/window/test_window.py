@@ -19,12 +19,12 @@ from mechanics.model.model import Model
 from mechanics.recording.recording import read_recording
 from palpate.operations.touch import Touched
 from palpate.window.axes import ROOM
-from palpate.window.board import BODY
 from palpate.window.charts import LEAST_MM, LEAST_N, LiveCharts
 from palpate.window.game import Game
 from palpate.window.panel import DEPTH
 from palpate.window.picture import STIFFNESS
 from palpate.window.session import SessionOptions, TouchSession
+from palpate.window.widgets import BODY
 from palpate.window.window import COLUMN, TouchWindow
 from scenes.phantoms import Region
 from scenes.scene import Scene, load_scene

@@ -14,7 +14,7 @@ import numpy as np
 from mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.disk.store import content_key, load_or_build
 from mechanics.effects.hold import base_hold
-from mechanics.elastic.support import BaseHold
+from mechanics.elastic.held_base import BaseHold
 from mechanics.errors import OptionError
 from mechanics.model.model import Model
 from mechanics.options import option
@@ -83,8 +83,8 @@ def load_or_condense(
 
     The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model,
     a damaged or a truncated file is rebuilt. Of the model's effects those of the base count
-    (mechanics.elastic.support). That of a model that was never written stays in memory until the next one's.
-    A folder that cannot be written keeps nothing. A large surface is compressed (ComplianceOptions).
+    (mechanics.elastic.held_base). That of a model that was never written stays in memory until the next
+    one's. A folder that cannot be written keeps nothing. A large surface is compressed (ComplianceOptions).
     """
     material = model.material
     hold = _hold(model)

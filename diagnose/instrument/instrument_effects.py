@@ -14,7 +14,7 @@ from diagnose.forward.prediction import Forward
 from diagnose.instrument.free_air import FreeAir
 from diagnose.instrument.free_air_offsets import InstrumentOffsets, around, free_air_offsets, matters
 from diagnose.instrument.retraced import Move
-from diagnose.instrument.rigid import Rigid
+from diagnose.instrument.support_readings import Rigid
 from diagnose.options import AttributionOptions
 from mechanics.effects.backlash import EFFECT as PLAY
 from mechanics.effects.base import Effect

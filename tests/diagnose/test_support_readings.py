@@ -10,8 +10,13 @@ import pytest
 
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
-from diagnose.instrument.offsets import find_instrument_offsets, read_sideways, ruled_out, seen_play
-from diagnose.instrument.rigid import Rigid, rigid_of
+from diagnose.instrument.instrument_effects import (
+    find_instrument_offsets,
+    read_sideways,
+    ruled_out,
+    seen_play,
+)
+from diagnose.instrument.support_readings import Rigid, rigid_of
 from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.attribution import attribute
 from diagnose.search.evidence import Search
