@@ -38,9 +38,9 @@ _READERS: dict[str, tuple[str, str]] = {
     ".mat": (f"{_HOME}.arrays:matlab", "h5py"),
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), (f"{_HOME}.arrays:hdf5", "h5py")),
     ".parquet": (f"{_HOME}.arrays:parquet", "pyarrow"),
-    ".bag": (f"{_HOME}.messages:bag", "rosbags"),
-    ".db3": (f"{_HOME}.messages:bag", "rosbags"),
-    ".mcap": (f"{_HOME}.messages:mcap", "mcap, rosbags"),
+    ".bag": (f"{_HOME}.ros_bags:bag", "rosbags"),
+    ".db3": (f"{_HOME}.ros_bags:bag", "rosbags"),
+    ".mcap": (f"{_HOME}.ros_bags:mcap", "mcap, rosbags"),
 }
 """Suffix -> reader, and the libraries that it needs beyond the program's own."""
 SUFFIXES = tuple(_READERS)
