@@ -15,6 +15,8 @@ import tempfile
 from collections.abc import Callable
 from contextlib import chdir
 from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,7 @@ from mechanics.shape.tetmesh import TetMesh
 from render.options import BEST, RenderOptions
 from render.registry import create
 from render.replay import replay
+from render.simulators import base
 
 POISSON = 0.40
 """Of the object: what every one of them can be given."""
@@ -167,6 +170,14 @@ def squeezed_mesh(cells: int) -> TetMesh:
     return dataclasses.replace(mesh, points=points)
 
 
+@cache
+def _code_of(adapter: str) -> str:
+    """What its forces depend on beside what it is given: its version, and our files that ask it."""
+    home = Path(base.__file__).parent
+    sources = [(home / f"{name}.py").read_text() for name in (adapter.replace("-", "_"), "base")]
+    return version(adapter) + hashlib.sha256("".join(sources).encode()).hexdigest()
+
+
 class Runs:
     """Runs of simulators over one block's presses, kept in a folder; None: only here."""
 
@@ -181,7 +192,7 @@ class Runs:
         words = json.dumps(
             [adapter, dataclasses.asdict(simulation), dataclasses.asdict(LAYOUT)], sort_keys=True
         )
-        key = hashlib.sha256(words.encode()).hexdigest()[:20]
+        key = hashlib.sha256(f"{words} {_code_of(adapter)}".encode()).hexdigest()[:20]
         path = None if self.folder is None else self.folder.resolve() / f"{key}.npy"
         if key not in self._here and path is not None and path.exists():
             self._here[key] = np.load(path)
