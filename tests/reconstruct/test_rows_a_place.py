@@ -61,10 +61,12 @@ def held_out(slab):
     return found
 
 
+@pytest.mark.slow
 def test_few_rows_a_place_ask_for_the_same_field(held_out):
     assert {rows: asked for rows, (_, asked) in held_out.items()} == dict.fromkeys(ROWS, FOLDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rows", "worse"), [(5, 0.10), (10, 0.05)])
 def test_held_out_presses_are_predicted_as_well_as_from_a_hundred_rows(held_out, rows, worse):
     assert held_out[rows][0] < (1 + worse) * held_out[100][0]

@@ -66,7 +66,10 @@ def deviation_of_hull(truth):
     return truth.volume_m3 / trimesh.Trimesh(truth.vertices, truth.triangles).convex_hull.volume
 
 
-@pytest.mark.parametrize("name", ["frustum", "ellipsoid", "blob", "gable"])
+@pytest.mark.parametrize(
+    "name",
+    ["frustum", "blob", *(pytest.param(name, marks=pytest.mark.slow) for name in ("ellipsoid", "gable"))],
+)
 def test_shapes_nobody_told_it_of(name):
     _, error = reconstructed(OWN[name]())
     assert error["mean_m"] < 1.5 * MEAN_M
