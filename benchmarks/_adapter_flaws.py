@@ -8,8 +8,6 @@ Every run is kept by all that it depends on, so a benchmark can be resumed.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
 import math
 import tempfile
 from collections.abc import Callable
@@ -24,6 +22,8 @@ import numpy as np
 
 from benchmarks._simulated_flaws import MODULUS_PA, RADIUS_M, Block, Given, Layout
 from diagnose.other_simulator.stated import Stated
+from mechanics.disk.store import content_key
+from mechanics.disk.writing import atomic_file
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Tool
 from mechanics.progress import silent
@@ -171,11 +171,11 @@ def squeezed_mesh(cells: int) -> TetMesh:
 
 
 @cache
-def _code_of(adapter: str) -> str:
+def _code_of(adapter: str) -> tuple[str, ...]:
     """What its forces depend on beside what it is given: its version, and our files that ask it."""
     home = Path(base.__file__).parent
-    sources = [(home / f"{name}.py").read_text() for name in (adapter.replace("-", "_"), "base")]
-    return version(adapter) + hashlib.sha256("".join(sources).encode()).hexdigest()
+    names = adapter.replace("-", "_"), "base"
+    return version(adapter), *((home / f"{name}.py").read_text() for name in names)
 
 
 class Runs:
@@ -189,10 +189,9 @@ class Runs:
 
     def force(self, adapter: str, simulation: Simulation) -> np.ndarray:
         """(n, 3) N on the tool."""
-        words = json.dumps(
-            [adapter, dataclasses.asdict(simulation), dataclasses.asdict(LAYOUT)], sort_keys=True
-        )
-        key = hashlib.sha256(f"{words} {_code_of(adapter)}".encode()).hexdigest()[:20]
+        settings = dict(sorted(simulation.settings.items()))
+        content = dataclasses.replace(simulation, settings=settings), LAYOUT, _code_of(adapter)
+        key = content_key(adapter, *content)
         path = None if self.folder is None else self.folder.resolve() / f"{key}.npy"
         if key not in self._here and path is not None and path.exists():
             self._here[key] = np.load(path)
@@ -200,7 +199,8 @@ class Runs:
             self._here[key] = self._run(adapter, simulation)
             if path is not None:
                 path.parent.mkdir(parents=True, exist_ok=True)
-                np.save(path, self._here[key])
+                with atomic_file(path) as temporary, temporary.open("wb") as handle:
+                    np.save(handle, self._here[key])
         return self._here[key]
 
     def _run(self, adapter: str, simulation: Simulation) -> np.ndarray:

@@ -7,7 +7,7 @@ is drawn is drawn widely: shape, tip, depths, modulus, noise, how far places are
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -126,5 +126,4 @@ def _solved(
     ball[:, 2] = -np.abs(ball[:, 2])
     soft = np.array([np.exp(-log_ratio(p + 0.7 * tip * ball)).mean() for p in points])
     far = (solved.far + (1 - soft)[:, None, None] * half) / soft[:, None, None]
-    sites = TouchSites(points, normals, solved.curvature, far, solved.patch_width_m, NU, solved.bracing)
-    return sites, 1 / soft
+    return replace(solved, far=far), 1 / soft

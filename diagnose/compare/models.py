@@ -17,7 +17,7 @@ from functools import partial
 
 import numpy as np
 
-from mechanics.compliance.pressed_places import UNIFORM, Places
+from mechanics.compliance.pressed_places import UNIFORM, Places, places_at
 from mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
 from mechanics.compliance.smooth_field import SmoothField
 from mechanics.contact.touch import forces_at
@@ -36,7 +36,6 @@ from reconstruct.steps.s7_modulus.modulus_field import (
     PressModuli,
     asked_for,
     fit_field,
-    places_at,
     press_moduli,
     with_field,
 )

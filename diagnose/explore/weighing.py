@@ -25,7 +25,7 @@ from diagnose.search.gaps import modulus_share
 from diagnose.search.site_stiffness import site_stiffness_sd
 from diagnose.search.starts import first_touches
 from diagnose.search.whiten import Whitener
-from mechanics.compliance.pressed_places import Places
+from mechanics.compliance.pressed_places import places_at
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effects
 from mechanics.effects.settings import Settings
@@ -183,12 +183,7 @@ def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
     touches = touches_of(placed)
     model = _model(estimate, touches)
     sites, _ = solved_sites(e.solved, touches.point, touches.normal, model.material.poisson_ratio)
-    far = np.einsum("pij,pjk,plk->pil", touches.frame, sites.far, touches.frame)
-    places = Places(
-        model, touches.point, touches.normal, touches.frame, np.ascontiguousarray(far), sites.curvature,
-        sites.bracing,
-    )  # fmt: skip
-    forward = Forward(touches, places)
+    forward = Forward(touches, places_at(model, touches, sites))
     if e.exploration is not None:
         # bias, drift and the tool's weight are read in free air, not in presses
         free = free_air_of(e.exploration.recording, e.presses_placed)

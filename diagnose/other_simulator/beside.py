@@ -14,7 +14,6 @@ from diagnose.other_simulator.forces import Aligned
 from diagnose.other_simulator.parts import law_at
 from diagnose.other_simulator.stated import Stated, StatedForward
 from diagnose.verdict.answer import Findings
-from mechanics.compliance.pressed_places import Places
 from mechanics.model.model import Model
 from mechanics.presses.table import MARGIN_S, Presses
 from mechanics.progress import Progress
@@ -53,19 +52,10 @@ def beside(presses: Presses, model: Model, given: Aligned, findings: Findings, s
     np.minimum.at(fell_s, presses.press[own][signal.left], signal.t[signal.left])
     real = findings.forward
     rows = raw.rows(np.flatnonzero(keep))
-    forward = StatedForward(mended.of(keep), _of(real.places, keep), stated)
+    forward = StatedForward(mended.of(keep), real.places.of(keep), stated)
     fell_s = fell_s[np.searchsorted(presses.onset_s, forward.touches.onset_s)]
     keys = {name: values for name, (_, values) in seen.items()}
     return Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes)
-
-
-def _of(places: Places, keep: np.ndarray) -> Places:
-    """The places of some presses."""
-    if keep.all():
-        return places
-    own = ("point", "normal", "frame", "far", "curvature", "bracing")
-    cut = {name: getattr(places, name)[keep] for name in own}
-    return dataclasses.replace(places, **cut, stages={})
 
 
 def named_numerics(sides: Sides, rules: AttributionOptions, progress: Progress) -> Numerics:
@@ -81,7 +71,7 @@ def named_numerics(sides: Sides, rules: AttributionOptions, progress: Progress) 
     sides = dataclasses.replace(sides, fell_s=np.where(held, sides.fell_s, -np.inf))
     if held.all() and np.isinf(sides.fell_s).all():
         return _with_seen(sides, numerics_of(forward, rules, progress))
-    of_held = StatedForward(cut.of(held), _of(forward.places, held), forward.stated)
+    of_held = StatedForward(cut.of(held), forward.places.of(held), forward.stated)
     return _with_seen(sides, _over_all(sides, numerics_of(of_held, rules, progress), held))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,9 +11,10 @@ import numpy as np
 
 from mechanics.compliance.near_field import contact_width
 from mechanics.compliance.patch import PatchSampler
-from mechanics.compliance.sites import touch_sites, touch_solver
+from mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
 from mechanics.disk.store import content_key, load_or_build
 from mechanics.model.model import Model
+from mechanics.presses.table import Presses
 
 VERSION = 6
 UNIFORM = "uniform solver"
@@ -66,6 +67,13 @@ class Places:
             row[near] = own
         return weights
 
+    def of(self, presses: np.ndarray) -> Places:
+        """Those of some presses (p,) bool; stages are computed anew where any is left out."""
+        if presses.all():
+            return self
+        own = ("point", "normal", "frame", "far", "curvature", "bracing")
+        return replace(self, **{name: getattr(self, name)[presses] for name in own}, stages={})
+
     def stored(self, name: str, build: Callable[[], Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
         """The arrays of a stage: from the model's folder where they are there, else of `build` and kept."""
         return _stored(name, self.model, self.point, self.normal, build)
@@ -98,6 +106,13 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
     far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][place], frame)
     bent = (sites["curvature"][place], sites["bracing"][place])
     return Places(model, point, normal, frame, np.ascontiguousarray(far), *bent, stages)
+
+
+def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
+    """The presses' places on a model, where they are solved as touch sites already."""
+    frame = presses.frame
+    far = np.ascontiguousarray(np.einsum("pij,pjk,plk->pil", frame, sites.far, frame))
+    return Places(model, presses.point, presses.normal, frame, far, sites.curvature, sites.bracing)
 
 
 def _shared(point: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

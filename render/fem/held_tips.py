@@ -2,7 +2,8 @@
 
 A tip's place is interpolated between three corners of the mesh. The blocks of a pair's corners change only
 when one of the two comes onto another facet, some times a second, and are gathered then; the weights change
-whenever it slides. A large surface has a low-rank factor instead (mechanics.compliance.compression), mixed at each place.
+whenever it slides. A large surface has a low-rank factor instead (mechanics.compliance.compression), mixed
+at each place.
 """
 
 from __future__ import annotations

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from benchmarks._tissue import tissue
+from mechanics.compliance.pressed_places import places_at
 from mechanics.compliance.sites import touch_sites
 from mechanics.presses.table import Presses
 from reconstruct.steps.s7_modulus.modulus import fit_modulus
 from reconstruct.steps.s7_modulus.modulus_field import (
     asked_for,
     fit_field,
-    places_at,
     press_moduli,
     with_field,
 )

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.compliance.field_response import shares_of, tips_of
-from mechanics.compliance.pressed_places import Places
+from mechanics.compliance.pressed_places import Places, places_at
 from mechanics.compliance.sites import TouchSites
 from mechanics.compliance.smooth_field import (
     Estimate,
@@ -97,13 +97,6 @@ class PressModuli:
         )
         log_factor = self.shares.weight @ field.at(self.shares.nodes)
         return replace(found, modulus_pa=found.modulus_pa / there.ratio * np.exp(log_factor))
-
-
-def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
-    """The presses' places on a model of one modulus, where they are solved as touch sites already."""
-    frame = presses.frame
-    far = np.einsum("pij,pjk,plk->pil", frame, sites.far, frame)
-    return Places(model, presses.point, presses.normal, frame, far, sites.curvature, sites.bracing)
 
 
 def press_moduli(
