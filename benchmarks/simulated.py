@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._adapter_flaws import ALIKE, CONTROLS, AdapterFlaw, Runs, drawn_plan
+from benchmarks._adapter_flaws import ALIKE, CONTROLS, AdapterFlaw, Parameters, Runs, drawn_plan
 from benchmarks._simulated_flaws import FLAWS, Block, Flaw, Given, simulated
 from benchmarks._simulated_scores import figures_of, print_cases
 from benchmarks.timing import table
@@ -137,7 +137,8 @@ def _run_adapter(adapter: str, arguments: argparse.Namespace) -> dict[str, Any]:
     work = arguments.work
     runs = Runs(None if work is None else work / "runs")
     rng = np.random.default_rng(arguments.seed)
-    plan = drawn_plan(adapter, rng, arguments.singles, arguments.pairs)
+    parameters = Parameters(runs.block)
+    plan = drawn_plan(adapter, rng, arguments.singles, arguments.pairs, parameters)
     worlds = [_world(runs.block, late, k) for k, late in enumerate((False, True))]
     rows = _kept(work, f"{adapter}-")
     own: list[str] = []
