@@ -6,6 +6,8 @@ import pytest
 from benchmarks._adapter_flaws import CONTROLS, LAYOUT, POISSON, Parameters, drawn_plan
 from benchmarks._simulated_flaws import FLAWS, MODULUS_PA, RADIUS_M, Block, Given, simulated
 from benchmarks._simulated_scores import new_in
+from benchmarks.simulated import _verdict, _world
+from diagnose.other_simulator.forces import Forces
 
 
 def test_two_wrong_parameters_are_both_given():
@@ -51,3 +53,11 @@ def test_what_a_simulator_has_of_its_own_is_no_answer_to_what_was_planted():
     row |= {"right": {"damping": ["mesh_stiffness"]}}
     assert new_in(row)[0] == "mesh_stiffness"
     assert new_in({"sizes_n": {"time_step": 0.1}, "named": ["time_step"]}) == ["time_step"]
+
+
+@pytest.mark.slow
+def test_a_sensor_that_reads_late_gives_no_simulation_a_wrong_modulus():
+    block = Block(0, LAYOUT)
+    law = Forces(block.t, block.force(Given(poisson=POISSON)), "law")
+    verdict = _verdict(_world(block, True, 1), law, CONTROLS["scikit-fem"].stated)
+    assert "time_delay" in verdict.effects and not verdict.parts["parameters"].names
