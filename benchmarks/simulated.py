@@ -52,6 +52,7 @@ LATE_S = 0.03
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """How many cases of each kind."""
+    parser.add_argument("--kept", action="store_true", help="judge nothing, count what lies in --work")
     parser.add_argument("--singles", type=int, default=39, help="cases with one flaw")
     parser.add_argument("--pairs", type=int, default=12, help="cases with two")
     parser.add_argument("--controls", type=int, default=12, help="cases with none")
@@ -114,6 +115,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         worlds = cache(lambda number: _world(Block(0, LAYOUT), number % 2 == 1, number))
         said = [_run_adapter(adapter, arguments, worlds) for adapter in arguments.adapter]
         return {key: [each for one in said for each in one[key]] for key in ("figures", "cases")}
+    if arguments.kept:
+        return _said(list(_kept(arguments.work).values()))
     block = Block()
     world = cache(lambda late: _world(block, late))
     drawn = np.random.default_rng(arguments.seed)
@@ -139,11 +142,13 @@ def _run_adapter(
     """The same with flaws planted in a simulator (`_adapter_flaws`), whose control comes first. worlds: by
     number, diagnosed where it is asked for; that of odd ones has a late sensor."""
     work = arguments.work
+    rows = _kept(work, f"{adapter}-")
+    if arguments.kept:
+        return _said(list(rows.values()), f"{adapter}: ")
     runs = Runs(None if work is None else work / "runs")
     rng = np.random.default_rng(arguments.seed)
     parameters = Parameters(runs.block)
     plan = drawn_plan(adapter, rng, arguments.singles, arguments.pairs, parameters)
-    rows = _kept(work, f"{adapter}-")
     own: list[str] = []
     gaps: dict[str, float] = {}
     cases = [((), k) for k in range(max(arguments.controls, 1))] + [(p, 0) for p in plan]
