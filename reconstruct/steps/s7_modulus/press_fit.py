@@ -69,8 +69,8 @@ def fit_law(
     """Modulus and onset shift of every press from its samples shallower than `depth_m`.
 
     data: `press_data`. noise_n: N, standard deviation of a raw force component. start: an earlier fit whose
-    onset shifts are a good guess. law_error: error of the law as a share of the force; a sample's variance is
-    noise^2 + (law_error |f|)^2.
+    onset shifts are a good guess. law_error: error of the law as a share of the force, where the place is not
+    solved (TouchSites.law_error); a sample's variance is noise^2 + (law_error |f|)^2.
     """
     press, k = data.press, len(sites)
     noise_n = noise_n / np.sqrt(data.block)
@@ -78,7 +78,8 @@ def fit_law(
     normals = sites.normals[press]
     used = -np.einsum("ij,ij->i", data.displacement, normals) < depth_m
     squared_force = np.einsum("ij,ij->i", data.force, data.force)
-    weight = np.where(used, 1.0 / (noise_n**2 + law_error**2 * squared_force / 3), 0.0)
+    share = sites.law_error(law_error)[press]
+    weight = np.where(used, 1.0 / (noise_n**2 + share**2 * squared_force / 3), 0.0)
 
     def unit(shift: np.ndarray) -> np.ndarray:
         return forces_at(
