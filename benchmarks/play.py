@@ -140,7 +140,7 @@ def _joined(ways: list[np.ndarray], normals: np.ndarray) -> list[np.ndarray]:
     even = share**3 * (10 - 15 * share + 6 * share**2)
     found = []
     for k, way in enumerate(ways[:-1]):
-        out = 0.01 * (4 * even * (1 - even)) * (normals[k] + normals[k + 1])
+        out = 0.03 * (4 * even * (1 - even)) * (normals[k] + normals[k + 1])
         found.append(np.vstack([way, way[-1] + even * (ways[k + 1][0] - way[-1]) + out]))
     return [*found, ways[-1]]
 
@@ -158,8 +158,11 @@ def _force(
         STRAIN.act(settings, np.zeros(0), forward)
     if case.second:
         effect(case.second).act(settings, np.array(SECOND[case.second]), forward)
-    frame = made.frame[made.press]
-    return np.einsum("nji,nj->ni", frame, forward.predict(settings))
+    force = forward.predict(settings)
+    # behind the plane of a place lies more than the object
+    last = starts[1:] - np.append(np.full(len(starts) - 2, round(TRAVEL_S * RATE_HZ) - 2), 0)
+    force[np.arange(len(tip)) >= last[made.press]] = 0.0
+    return np.einsum("nji,nj->ni", made.frame[made.press], force)
 
 
 def judged(case: Case) -> dict[str, Any]:

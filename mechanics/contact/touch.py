@@ -216,9 +216,9 @@ class TouchedPlaces:
     def of(self, touches: Sequence[int]) -> TouchedPlaces:
         """Those of some touches."""
         rows = np.asarray(touches)
-        bent = (np.broadcast_to(x, (len(self.normals),))[rows] for x in (self.curvature, self.bracing))
+        curvature, bracing = np.broadcast_arrays(self.curvature, self.bracing, self.normals[:, 0])[:2]
         factors = None if self.factors is None else self.factors.of(rows)
-        return TouchedPlaces(self.normals[rows], self.far[rows], *bent, factors)
+        return TouchedPlaces(self.normals[rows], self.far[rows], curvature[rows], bracing[rows], factors)
 
 
 def touch_force(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -33,15 +33,15 @@ _STEPS = 24
 @dataclass(frozen=True, eq=False)
 class SolvedPlace:
     """One place. point (3,) m, normal (3,) outward; depth_m, law_n, solved_n: (k,) depths, normal force by
-    the law and by the solver. error_n: (k,) what the law may be off by (95 %), or None. law: of the dent,
-    where more than one was solved."""
+    the law and by the solver. error_n: (k,) what the law may be off by (95 %), () where nobody asked. law: of
+    the dent, where more than one may be solved."""
 
     point: np.ndarray
     normal: np.ndarray
     depth_m: np.ndarray
     law_n: np.ndarray
     solved_n: np.ndarray
-    error_n: np.ndarray | None = None
+    error_n: np.ndarray = field(default_factory=lambda: np.zeros(0))
     law: str = ""
 
     def factor(self, depth_m: np.ndarray) -> np.ndarray:
@@ -57,7 +57,7 @@ class SolvedPlace:
         """Plain."""
         plain = {"point_m": self.point, "normal": self.normal, "depth_m": self.depth_m, "law_n": self.law_n,
                  "solved_n": self.solved_n}  # fmt: skip
-        if self.error_n is not None:
+        if len(self.error_n):
             plain["force_error_n"] = self.error_n
         return {**plain, "dent_law": self.law} if self.law else plain
 
