@@ -206,9 +206,10 @@ def _solved(
     presses: SolvedPresses, touched: Touched, press: int, deepest_m: float, law: str
 ) -> SolvedPlace | None:
     """A press's place for unit modulus; None where fewer than two depths are solved."""
-    places, depths = touched.places, presses.depths(deepest_m)
-    normal = places.normals[press]
-    point = presses.solver.on_surface(touched.points[press])
+    # rounded, so that what a model's files hold is found again
+    places, depths = touched.places, presses.depths(round(deepest_m, 6))
+    normal = np.round(places.normals[press], 6)
+    point = np.round(presses.solver.on_surface(touched.points[press]), 6)
     way = np.unique(np.concatenate([np.linspace(0.0, depths[-1], _STEPS), depths]))
     by_law = touch_forces(
         -way[:, None] * normal, np.array([0, len(way)]), places.of([press]), young_modulus_pa=1.0,

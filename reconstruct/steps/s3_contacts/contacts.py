@@ -182,8 +182,13 @@ def _is_far(late: Delay) -> bool:
 
 def read_earlier(recording: Recording, delay_s: float) -> Recording:
     """The recording with its force shifted earlier by `delay_s`, to whole samples; the ends are repeated."""
-    rows = np.arange(len(recording.t)) + round(delay_s * recording.sample_rate_hz)
-    return replace(recording, force_on_tool=recording.force_on_tool[np.clip(rows, 0, len(rows) - 1)])
+    rows = _rows_later(recording.t, delay_s, recording.sample_rate_hz)
+    return replace(recording, force_on_tool=recording.force_on_tool[rows])
+
+
+def _rows_later(t: np.ndarray, seconds: float, rate_hz: float) -> np.ndarray:
+    """(n,) rows that hold what was read so much later than each of t (n,) s, some of which may be missing."""
+    return np.clip(np.searchsorted(t, t + seconds - 0.5 / rate_hz), 0, len(t) - 1)
 
 
 def _tabled(
@@ -199,7 +204,7 @@ def _tabled(
     """
     signals, contacts, (delay_s, delay_error_s) = found.spans.filtered.signals, found.touches, delay
     t, first_last = recording.t, found.boundary.interval
-    late = np.clip(np.arange(len(t)) - round(delay_s * recording.sample_rate_hz), 0, len(t) - 1)
+    late = _rows_later(t, -delay_s, recording.sample_rate_hz)
     presses = cut(
         recording,
         FoundPresses(
