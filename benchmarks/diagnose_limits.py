@@ -100,7 +100,7 @@ def _limits(recording: Recording, model: Model) -> dict[str, float]:
 
     forward = build_forward(touches_of(presses_on(recording, model)), model)
     nuisance = NuisanceOptions()
-    site_sd = site_stiffness_sd(forward.touches, model, nuisance)
+    site_sd = site_stiffness_sd(forward, nuisance)
     strain = next(e for e in effects() if e.role is Role.KNOWN)
     search = Search(
         forward, model.material.young_modulus_pa, nuisance=nuisance, options=AttributionOptions(),

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from scipy.special import logit
 
 from mechanics.effects.registry import known
-from mechanics.options import option
+from mechanics.options import EXACT, option
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class DiagnoseOptions:
         False, "half a minute instead of three: fewer effects, one in an answer, less sampling"
     )
     without: str = option("", "effects to leave out of the library, comma separated (for tests of 'unknown')")
+    exact: bool = option(False, EXACT)
     bootstrap: int = option(400, "resamplings of sites for intervals")
     seed: int = option(0, "seed of flips and resamplings")
 

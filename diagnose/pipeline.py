@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from diagnose.forward.prediction import build_forward
+from diagnose.forward.prediction import build_forward, solved
 from diagnose.forward.touches import REACH_M, reached, touches_of, unobservable_effects
 from diagnose.instrument.free_air import free_air_of
 from diagnose.instrument.instrument_effects import (
@@ -30,7 +30,7 @@ from mechanics.effects.base import Role
 from mechanics.effects.registry import effects
 from mechanics.model.model import Model
 from mechanics.presses.table import Presses
-from mechanics.progress import Clock, Progress, silent
+from mechanics.progress import Clock, Progress, part, silent
 from mechanics.recording.recording import Recording
 from reconstruct.presses_on_model import presses_on
 
@@ -63,6 +63,9 @@ def diagnose(
     progress("sites", 0.05)
     forward = build_forward(touches, model)
     clock.lap("sites")
+    if options.exact:
+        forward = solved(forward, part(progress, 0.05, 0.1))
+        clock.lap("solved places")
 
     unobservable = unobservable_effects(presses)
     excluded = {*options.left_out, *unobservable}
@@ -74,7 +77,7 @@ def diagnose(
     offsets = with_move(offsets, forward, move, excluded, rules)
 
     settled = {*offsets.names, *ruled_out(forward, rigid, move, rules)}
-    site_sd = site_stiffness_sd(touches, model, nuisance)
+    site_sd = site_stiffness_sd(forward, nuisance)
     if touches.sites != presses.of(met).sites:
         # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
         site_sd = np.full(len(touches), nuisance.press_stiffness)

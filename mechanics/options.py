@@ -16,6 +16,8 @@ from mechanics.disk.schema import span
 from mechanics.errors import OptionError
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 
+EXACT = "solve each touched place in place of reading the table (some 10 s of processor time a place)"
+"""Help of `exact`, wherever it is an option."""
 _BY_NAME = {
     "mesh_size_m": (5e-4, 0.2),
     "surface_distance_m": (2e-5, 0.05),

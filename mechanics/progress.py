@@ -14,6 +14,10 @@ def silent(stage: str, fraction: float) -> None:
     """The default: reports to nobody."""
 
 
+def unsaid(words: str) -> None:
+    """The default of what is told in whole sentences: nobody hears."""
+
+
 def part(progress: Progress, low: float, high: float) -> Progress:
     """The progress of a part of the work, from `low` to `high` of the whole."""
     return lambda stage, fraction: progress(stage, low + (high - low) * fraction)

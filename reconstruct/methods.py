@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
+from mechanics.contact.depth_factors import DepthFactors
+from mechanics.contact.touch import TouchedPlaces
+from mechanics.errors import OptionError
 from mechanics.options import option
+from mechanics.press_solver.solved_places import (
+    ExactPresses,
+    Touched,
+    check_laws,
+    deepest_of_sites,
+    said_beforehand,
+    solve_touched,
+)
 from mechanics.presses.table import Presses
 from mechanics.progress import Clock, Progress, part
 from mechanics.shape.tetmesh import TetMesh
@@ -54,7 +66,8 @@ class ReconstructOptions:
 
 @dataclass(frozen=True)
 class Body:
-    """What a modulus is fitted to. mesh: linear. presses: on the surface; curves: low-passed, in contact."""
+    """What a modulus is fitted to. mesh: linear. presses: on the surface; curves: low-passed, in contact.
+    say: is told how long takes what takes minutes."""
 
     mesh: TetMesh
     poisson_ratio: float
@@ -64,6 +77,15 @@ class Body:
     presses: Presses
     curves: Presses
     noise_n: float
+    say: Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Touched places that were solved, and the modulus by the tabulated law, before."""
+
+    presses: ExactPresses
+    by_table: ModulusFit
 
 
 @dataclass(frozen=True)
@@ -77,6 +99,7 @@ class Fitted:
     sites: TouchSites | None = None
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
+    solved: Solved | None = None
 
     @property
     def dent_law(self) -> str:
@@ -90,6 +113,8 @@ class FiniteTip:
     fit_one_d = staticmethod(fit_robust)
 
     def __init__(self, options: ReconstructOptions) -> None:
+        if options.modulus.exact and options.modulus.law != "auto":
+            check_laws([options.modulus.law])
         self.options = options
         self.surface_options, self.meshing_options = options.surface, options.meshing
 
@@ -107,15 +132,35 @@ class FiniteTip:
             solver, sites, uncertainty_at(solver.mesh, local), pose=None if placed is None else placed.pose
         )
         clock.lap("shape error")
-        fit = fit_modulus(
-            body.presses,
-            sites,
-            body.noise_n,
-            self.options.modulus,
-            compliance_covariance=covariance,
-            seed=self.options.seed,
-        )
-        return Fitted(mesh, fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa, sites, fit)
+
+        def fitted(exact: Mapping[str, DepthFactors] | None = None) -> ModulusFit:
+            return fit_modulus(
+                body.presses, sites, body.noise_n, self.options.modulus,
+                compliance_covariance=covariance, exact=exact, seed=self.options.seed,
+            )  # fmt: skip
+
+        fit, solved = fitted(), None
+        if self.options.modulus.exact:
+            clock.lap("modulus")
+            solved = Solved(_solve(body, mesh, sites, fit, part(progress, 0.8, 0.95)), fit)
+            clock.lap("solved places")
+            fit = fitted(solved.presses.factors)
+            sites = dataclasses.replace(sites, factors=solved.presses.factors[fit.press.law])
+        return Fitted(mesh, fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa, sites, fit, solved=solved)
+
+
+def _solve(body: Body, mesh: TetMesh, sites: TouchSites, fit: ModulusFit, progress: Progress) -> ExactPresses:
+    """The touched places, by the laws of the dent that a fit with tabulated ones left open."""
+    laws = [law for law, (_, _, share) in fit.by_law.items() if share > 0]
+    presses = body.presses
+    places = TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing)
+    touched = Touched(sites.points, presses.site, presses.deepest, places)
+    places_to_solve = len(deepest_of_sites(touched.site, touched.deepest_m))
+    body.say(f"--exact: {said_beforehand(places_to_solve, len(laws))}")
+    return solve_touched(
+        mesh, touched, laws, ratio=np.ones(len(mesh.tetrahedra)), poisson_ratio=body.poisson_ratio,
+        young_modulus_pa=fit.modulus_pa, tip_radius_m=presses.tip_radius_m, progress=progress,
+    )  # fmt: skip
 
 
 class Paper:
@@ -125,6 +170,8 @@ class Paper:
     fit_one_d = staticmethod(fit_paper)
 
     def __init__(self, options: ReconstructOptions) -> None:
+        if options.modulus.exact:
+            raise OptionError("--exact solves touches of a finite tip: leave out --method paper")
         self.options = options
         self.surface_options, self.meshing_options = options.surface, options.meshing
         if options.surface.surface == "auto":

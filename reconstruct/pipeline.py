@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -17,7 +18,7 @@ from mechanics.errors import ContactError, NoBaseError, OptionError
 from mechanics.model.files import read_model
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool
-from mechanics.progress import Clock, Progress, part, silent
+from mechanics.progress import Clock, Progress, part, silent, unsaid
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from mechanics.recording.recording import Recording, base_model_of
 from mechanics.result import Result
@@ -29,7 +30,7 @@ from reconstruct.geometry.in_device_frame import Placed, nowhere
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.known_shape import place
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
-from reconstruct.methods import BY_NAME, Body, Fitted, Method
+from reconstruct.methods import BY_NAME, Body, Fitted, Method, Solved
 from reconstruct.methods import ReconstructOptions as ReconstructOptions
 from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
@@ -53,8 +54,8 @@ class Reconstruction(Result):
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
     findings: of the check-up, grave ones first; the interval is as wide as they make it. held_out: how the
-    model predicts places that were held out; None by the method paper, or of one place. `plot`: force over
-    time with the touches that were found. `show`: the model.
+    model predicts places that were held out; None by the method paper, or of one place. exact: touched places
+    that were solved. `plot`: force over time with the touches that were found. `show`: the model.
     """
 
     model: Model
@@ -71,6 +72,7 @@ class Reconstruction(Result):
     placed: Placed | None = None
     findings: tuple[Finding, ...] = ()
     held_out: HeldOut | None = None
+    exact: Solved | None = None
 
     @property
     def doubt(self) -> str:
@@ -114,19 +116,26 @@ def reconstruct(
 
 
 def reconstruct_fully(
-    recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
+    recording: Recording,
+    options: ReconstructOptions | None = None,
+    progress: Progress = silent,
+    say: Callable[[str], None] = unsaid,
 ) -> Reconstruction:
-    """As `reconstruct`, with the intermediate results."""
+    """As `reconstruct`, with the intermediate results. say: is told how long takes what takes minutes."""
     options = options or ReconstructOptions()
     if options.method not in BY_NAME:
         raise OptionError(f"method {options.method!r} is unknown; allowed are {', '.join(BY_NAME)}")
     method = BY_NAME[options.method](options)
     with BackgroundMesher(method.meshing_options) as mesher:
-        return _reconstructed(recording, method, progress, mesher)
+        return _reconstructed(recording, method, progress, mesher, say)
 
 
 def _reconstructed(
-    recording: Recording, method: Method, progress: Progress, mesher: BackgroundMesher
+    recording: Recording,
+    method: Method,
+    progress: Progress,
+    mesher: BackgroundMesher,
+    say: Callable[[str], None],
 ) -> Reconstruction:
     """Section 2 in order; what the two methods do differently is theirs."""
     options, clock = method.options, Clock()
@@ -154,7 +163,7 @@ def _reconstructed(
     mesh = mesher.mesh(surface)
     clock.lap("mesh")
     progress("factorise", 0.5)
-    body = Body(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n)
+    body = Body(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n, say)
     fitted = method.fit(body, progress, clock)
     interval = checkup.interval(outcome_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
     clock.lap("modulus")
@@ -188,6 +197,7 @@ def _reconstructed(
         placed=placed,
         findings=checkup.found,
         held_out=predicted,
+        exact=fitted.solved,
     )
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.errors import ContactError, NoBaseError
+from mechanics.errors import ContactError
 from mechanics.model.model import Model
 from mechanics.presses.table import Presses
 from mechanics.recording.recording import Recording
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
+from reconstruct.steps.s1_filter.signals import stated_tracing
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s3_contacts.left_out import off_surface, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
@@ -64,8 +65,9 @@ def _found(recording: Recording, model: Model) -> Presses:
     if not is_points(recording) and not stated_geometry(recording, GeometryOptions()).known:
         try:
             return explore(recording, contact_options=_ANY).presses
-        except NoBaseError:
-            pass
+        except ContactError:
+            if stated_tracing(recording) is not None:
+                raise  # else slides of the object may have passed for a tracing that never was
     base = base_of_model(model, recording.tip_radius_m)
     if is_points(recording):
         return explore_points(recording, base, _ANY).presses

@@ -74,7 +74,7 @@ def calibrate_on_object(
     nuisance = NuisanceOptions()
     search = Search(
         forward, modulus_pa, nuisance=nuisance, options=AttributionOptions(),
-        site_sd=site_stiffness_sd(touches, model, nuisance), finite_strain=FINITE,
+        site_sd=site_stiffness_sd(forward, nuisance), finite_strain=FINITE,
     )  # fmt: skip
     base = [FINITE] if material.dent_law == "neo-hookean" else []
     # a bending that a rigid support shows is settled there

@@ -188,7 +188,7 @@ def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
         # bias, drift and the tool's weight are read in free air, not in presses
         free = free_air_of(e.exploration.recording, e.presses_placed)
         find_instrument_offsets(forward, free, None, set())
-    return forward, site_stiffness_sd(touches, model, NUISANCE)
+    return forward, site_stiffness_sd(forward, NUISANCE)
 
 
 def _model(e: Estimate, presses: Presses) -> Model:

@@ -7,7 +7,7 @@ elastic object -> what follows the path (softening, memory, adhesion) -> what th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
@@ -17,10 +17,14 @@ from diagnose.forward import kernel
 from diagnose.forward.touches import place_of
 from mechanics.compliance.pressed_places import Places, solve_places
 from mechanics.contact.dent import bend_of, effective_radius
+from mechanics.contact.touch import TouchedPlaces
 from mechanics.effects.laws_along_path import new_memory, path_numbers
 from mechanics.effects.settings import Settings
 from mechanics.model.model import Model
+from mechanics.press_solver.press import LAWS
+from mechanics.press_solver.solved_places import ExactPresses, Touched, solve_touched
 from mechanics.presses.table import Presses
+from mechanics.progress import Progress, silent
 from mechanics.recording.kinematics import acceleration
 
 KEPT = 8
@@ -31,11 +35,13 @@ KEPT = 8
 class Forward:
     """Presses with the mechanics of their places; `predict(settings)` is the forward model.
 
-    What effects see of it: mechanics.effects.settings.Scene.
+    What effects see of it: mechanics.effects.settings.Scene. exact: the places solved, by which the law's
+    forces are corrected along the depth.
     """
 
     touches: Presses
     places: Places
+    exact: ExactPresses | None = field(default=None, kw_only=True)
     measured: ClassVar[bool] = True
     """Whether a sensor read the forces; a simulator's modulus and surface are known: no fit moves them."""
 
@@ -48,6 +54,12 @@ class Forward:
         """(n, 3) m/s^2, device frame, press by press from the thinned positions as they were read."""
         t = self._as_read
         return np.concatenate([acceleration(t.t[part], t.position[part]) for part in t.parts])
+
+    def law_error(self, usual: float) -> np.ndarray:
+        """(p,) standard error of the law as a share of the force; the usual one where nothing is solved."""
+        if self.exact is None:
+            return np.full(len(self.touches), usual)
+        return next(iter(self.exact.factors.values())).law_error(usual)
 
     @property
     def model(self) -> Model:
@@ -136,6 +148,8 @@ class Forward:
             far, mu = np.ascontiguousarray(s.far), float(s.touch.friction)
             touched = (radius, bend, modulus * s.dent_ratio, modulus)
             kernel.integrate(t.starts, y, far, *touched, s.nu, table, compliance, mu, f)
+            if self.exact is not None and s.touch.dent_law in self.exact.factors:
+                f *= self.exact.factors[s.touch.dent_law].at(t.press, y[:, 0])[:, None]
             if len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[key] = f
@@ -162,3 +176,16 @@ class Forward:
 def build_forward(touches: Presses, model: Model) -> Forward:
     """Solve the far field at every press's place (one factorisation, three solves a place)."""
     return Forward(touches, solve_places(model, touches.point, touches.normal, touches.frame))
+
+
+def solved(forward: Forward, progress: Progress = silent) -> Forward:
+    """The same with its touched places solved under every law that a diagnosis weighs."""
+    t, places, model = forward.touches, forward.places, forward.model
+    far = np.einsum("pji,pjk,pkl->pil", places.frame, places.far, places.frame)
+    known = TouchedPlaces(t.normal, far, places.curvature, places.bracing)
+    exact = solve_touched(
+        model.mesh, Touched(t.point, place_of(t), t.deepest, known), LAWS, ratio=model.element_ratio,
+        poisson_ratio=model.material.poisson_ratio, young_modulus_pa=model.material.young_modulus_pa,
+        tip_radius_m=forward.tip_radius, progress=progress,
+    )  # fmt: skip
+    return Forward(t, places, exact=exact)

@@ -30,7 +30,7 @@ def sizes_alone(
     law = law_at(forward, measured, numerics)
     # what the samples themselves show is a share of the force that is there
     level = weighing.rms_n(law) / max(weighing.rms_n(numerics.with_numerics), 1e-12)
-    right = StatedForward(forward.touches, forward.places, measured)
+    right = StatedForward(forward.touches, forward.places, measured, exact=forward.exact)
     sizes = {}
     for name in numerics.named:
         if name not in numerics.values:

@@ -114,12 +114,13 @@ def attribute(
         chosen.append(best.name)
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
-    picked = list(zip(steps, chosen, strict=False))
-    taken = tuple(name for _, name in picked)
+    known_p = [confidence_set_p(step) for step in steps[: max(len(chosen), 1)]]
+    picked = list(zip(steps, known_p, chosen, strict=False))
+    taken = tuple(name for *_, name in picked)
     current, chosen = _without_idle(search, chosen, current, seen)
     if any(n not in seen for n in chosen):
         current, chosen = fewer(search, chosen, current, steps[0], seen)
-        picked += [(steps[0], n) for n in chosen if n not in taken]
+        picked += [(steps[0], known_p[0], n) for n in chosen if n not in taken]
     for effect in current.found.effects:
         current = _refined(search, effect, current)
     asked = [n for n in chosen if n not in seen]
@@ -127,7 +128,7 @@ def attribute(
     order = _strongest_first(search, current, chosen)
     return Attribution(
         base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps),
-        taken, float(strain_gain), confidence_set_p(steps[0]),
+        taken, float(strain_gain), known_p[0],
     )  # fmt: skip
 
 

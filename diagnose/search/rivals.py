@@ -54,16 +54,16 @@ def confidence_p(losses: np.ndarray, rng: np.random.Generator, draws: int = 1000
 
 def rivals_of(
     search: Search,
-    picked: list[tuple[dict[str, Score], str]],
+    picked: list[tuple[dict[str, Score], dict[str, float], str]],
     chosen: list[str],
 ) -> tuple[str, ...]:
     """Effects that would be named themselves and that the sites do not tell from the one picked in the same
-    step; the likeliest first."""
+    step; the likeliest first. picked: a step's scores, their `confidence_set_p`, and what it took."""
     found: dict[str, float] = {}
-    for scores, name in picked:
+    for scores, p, name in picked:
         if name not in chosen:
             continue
-        first, p = scores[name], confidence_set_p(scores)
+        first = scores[name]
         for score in scores.values():
             if score.name in chosen or of_one_phenomenon(score.effect, first.added):
                 continue

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from diagnose.forward.prediction import Forward
 from diagnose.options import NuisanceOptions
 from diagnose.search.fit import Fit
-from mechanics.model.model import Model
 from mechanics.presses.table import Presses
 
 SHARE_PER_HEIGHT = 2.5
@@ -15,11 +15,13 @@ SHARE_PER_HEIGHT = 2.5
 double)."""
 
 
-def site_stiffness_sd(touches: Presses, model: Model, options: NuisanceOptions) -> np.ndarray:
-    """(p,) share by which a press's stiffness may be wrong: mesh and law, and the surface's own
-    uncertainty."""
+def site_stiffness_sd(forward: Forward, options: NuisanceOptions) -> np.ndarray:
+    """(p,) share by which a press's stiffness may be wrong: mesh and law, or the solution of its place, and
+    the surface's own uncertainty."""
+    touches, model = forward.touches, forward.model
+    of_law = forward.law_error(options.site_stiffness)
     if model.shape_uncertainty_m is None:
-        return np.full(len(touches), options.site_stiffness)
+        return of_law
     surface = np.flatnonzero(model.mesh.touchable)
     height = np.ptp(model.support.height(model.mesh.points))
     tree = cKDTree(model.mesh.points[surface])
@@ -27,7 +29,7 @@ def site_stiffness_sd(touches: Presses, model: Model, options: NuisanceOptions) 
     spread = np.array(
         [np.sqrt(np.mean(model.shape_uncertainty_m[surface[i]] ** 2)) if len(i) else 0.0 for i in near]
     )
-    return np.sqrt(options.site_stiffness**2 + (SHARE_PER_HEIGHT * spread / height) ** 2)
+    return np.sqrt(of_law**2 + (SHARE_PER_HEIGHT * spread / height) ** 2)
 
 
 def site_factors(found: Fit, touches: Presses) -> tuple[np.ndarray, np.ndarray]:

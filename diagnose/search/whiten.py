@@ -176,7 +176,7 @@ def nuisance_columns(
         ("site", np.column_stack([zero, normal, zero]) * options.tilt),
         ("site", np.column_stack([zero, zero, normal]) * options.tilt),
         ("press", tangential * options.stick),
-        ("site", f * (bend * options.law)[:, None]),
+        ("site", f * (bend * forward.law_error(options.law)[t.press])[:, None]),
     ]
 
 

@@ -14,6 +14,7 @@ from diagnose.instrument.free_air import FreeAir
 from diagnose.search.attribution import Attribution
 from diagnose.verdict.where import Where
 from mechanics.model.model import Model
+from mechanics.press_solver.solved_places import ExactPresses
 from mechanics.recording.recording import Recording
 from mechanics.result import Result
 
@@ -154,6 +155,11 @@ class Diagnosis(Result):
         return apply.corrected(self.recording, self)
 
     @property
+    def exact(self) -> ExactPresses | None:
+        """The touched places that were solved."""
+        return None if self.forward is None else self.forward.exact
+
+    @property
     def summary(self) -> str:
         """The verdict in one sentence."""
         return _SENTENCES[self.kind].format(
@@ -206,6 +212,7 @@ class Diagnosis(Result):
             "confusable": [{"pair": [a, b], "cosine": c} for a, b, c in self.confusable],
             "seconds": dict(self.seconds),
             "left_out": list(self.left_out),
+            **({} if self.exact is None else {"exact": self.exact.as_json()}),
         }
 
 

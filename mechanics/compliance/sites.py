@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from mechanics.compliance.compression import own_blocks
 from mechanics.compliance.near_field import contact_width, sharpening
 from mechanics.compliance.patch import half_space_compliance, usual_width
+from mechanics.contact.depth_factors import DepthFactors
 from mechanics.contact.edges import edge_law
 from mechanics.elastic.held_base import BaseHold
 from mechanics.elastic.solver import Solver
@@ -37,7 +38,7 @@ class TouchSites:
     half-space.
     patch_width_m, poisson_ratio: what they hold for.
     bracing: (k,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges); none
-    unless given.
+    unless given. factors: of the k, on the force of the law that they were solved beside, or None.
     """
 
     points: np.ndarray
@@ -47,6 +48,7 @@ class TouchSites:
     patch_width_m: float
     poisson_ratio: float
     bracing: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    factors: DepthFactors | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -55,8 +57,13 @@ class TouchSites:
         """Some of the sites, in order."""
         return TouchSites(
             self.points[rows], self.normals[rows], self.curvature[rows], self.far[rows], self.patch_width_m,
-            self.poisson_ratio, self.bracing[rows],
+            self.poisson_ratio, self.bracing[rows], None if self.factors is None else self.factors.of(rows),
         )  # fmt: skip
+
+    def law_error(self, usual: float) -> np.ndarray:
+        """(k,) standard error of the law of the touch as a share of the force; the usual one where no place
+        is solved."""
+        return np.full(len(self), usual) if self.factors is None else self.factors.law_error(usual)
 
     def __post_init__(self) -> None:
         given = np.broadcast_to(np.asarray(self.bracing, dtype=float), (len(self.points),))

@@ -16,6 +16,7 @@ float array of STATE_SIZE, zero before first touch; it holds the ring memory and
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ from numba import njit
 
 from mechanics.compliance.sites import TouchSites
 from mechanics.contact.dent import DentLaw, bend_of, dent_force, dent_law, effective_radius
+from mechanics.contact.depth_factors import DepthFactors
 from mechanics.frames import local_frames
 from mechanics.kernels import kernel
 
@@ -202,12 +204,21 @@ def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]
 @dataclass(frozen=True)
 class TouchedPlaces:
     """Where k touches are. normals: (k, 3) outward unit. far: (k, 3, 3) 1/m, unit modulus (TouchSites.far).
-    curvature: (k,) or one, 1/m, mean, convex positive. bracing: (k,) or one, 1/m (TouchSites.bracing)."""
+    curvature: (k,) or one, 1/m, mean, convex positive. bracing: (k,) or one, 1/m (TouchSites.bracing).
+    factors: on the forces, where the places are solved."""
 
     normals: np.ndarray
     far: np.ndarray
     curvature: np.ndarray | float = 0.0
     bracing: np.ndarray | float = 0.0
+    factors: DepthFactors | None = None
+
+    def of(self, touches: Sequence[int]) -> TouchedPlaces:
+        """Those of some touches."""
+        rows = np.asarray(touches)
+        curvature, bracing = np.broadcast_arrays(self.curvature, self.bracing, self.normals[:, 0])[:2]
+        factors = None if self.factors is None else self.factors.of(rows)
+        return TouchedPlaces(self.normals[rows], self.far[rows], curvature[rows], bracing[rows], factors)
 
 
 def touch_force(
@@ -264,6 +275,9 @@ def touch_forces(
     frames = local_frames(places.normals)
     fars = np.ascontiguousarray(np.asarray(places.far, dtype=float) / young_modulus_pa)
     _touch_paths(displacement, starts, frames, fars, table, radii, bends, plane_strain, stick, out)
+    if places.factors is not None:
+        touch = np.repeat(np.arange(count), np.diff(starts))
+        out *= places.factors.at(touch, -np.einsum("nc,nc->n", displacement, places.normals[touch]))[:, None]
     return out
 
 
@@ -280,7 +294,7 @@ def forces_at(
     return touch_forces(
         displacement,
         starts,
-        TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing),
+        TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing, sites.factors),
         young_modulus_pa=young_modulus_pa,
         poisson_ratio=sites.poisson_ratio,
         tip_radius_m=tip_radius_m,

@@ -92,6 +92,11 @@ class PressSolver:
         self.tip_radius_m, self.options = float(tip_radius_m), options
         self._ratio = np.ones(len(mesh.tetrahedra)) if ratio is None else np.asarray(ratio, dtype=float)
 
+    def on_surface(self, point: np.ndarray) -> np.ndarray:
+        """(3,) m, the felt place nearest to a point (3,) m."""
+        point = np.asarray(point, dtype=float)
+        return point if self._surface is None else self._surface.nearest(point)[0]
+
     def press(
         self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, slide: np.ndarray | None = None
     ) -> PressSolution:

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     RecordingLike = str | Path | mechanics.recording.recording.Recording | Simulation
     ModelLike = str | Path | mechanics.model.model.Model | Reconstruction | Scene
 
-EXACT = "solve each touched place in place of reading the table (some 10 s of processor time a place)"
 PAGE = "palpate.show.page:PAGE"
 MODEL = "mechanics.model.files:MODEL"
 SAMPLES = "mechanics.recording.files:SAMPLES"

@@ -153,6 +153,8 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
     simulation lacks. Raises DiagnosisError where the data cannot carry it.
     """
     from diagnose.pipeline import diagnose as diagnosed
+    from mechanics.press_solver.press import LAWS
+    from mechanics.press_solver.solved_places import deepest_of_sites, said_beforehand
     from reconstruct.presses_on_model import presses_on
 
     forces = _forces(asked)
@@ -168,6 +170,9 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
         else:
             plain = load(source, progress=tell)
             made, begun = plain.replaced(presses=presses_on(measured, plain)), 0.0
+        if options.exact:
+            places = deepest_of_sites(made.presses.site, made.presses.deepest)
+            call.out.say(f"--exact: {said_beforehand(len(places), len(LAWS))}")
         rules: dict[str, Any] = {
             "nuisance": call.of(NuisanceOptions),
             "attribution": call.of(AttributionOptions),

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mechanics.disk.surface_files import is_surface_file
+from mechanics.options import EXACT
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._run import say_next
 from palpate.operations._shared import (
-    EXACT,
     MeshFileOptions,
     given_model,
     model_operand,
@@ -115,7 +115,8 @@ def press(asked: PressOperands, call: Call) -> Curve:
     """
     import numpy as np
 
-    from render.exact import ExactPlaces, check_renderer, said_beforehand
+    from mechanics.press_solver.solved_places import said_beforehand
+    from render.exact import ExactPlaces, check_renderer
     from render.press import Stroke, read_curve, solved
     from render.press import press as pressed
 

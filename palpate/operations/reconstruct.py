@@ -111,7 +111,7 @@ def reconstruct(asked: ReconstructOperands, call: Call) -> Reconstruction:
     }
     chosen = call.of(ReconstructOptions, **steps, seed=asked.seed)
     with call.progress("reconstruct") as tell:
-        made = reconstruct_fully(read_recording(asked.recording), chosen, tell)
+        made = reconstruct_fully(read_recording(asked.recording), chosen, tell, call.out.say)
     if asked.save is not None:
         made = dataclasses.replace(made, model=made.model.save(asked.save))
         felt_surface(made.model, made.sites)

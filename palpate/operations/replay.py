@@ -11,8 +11,9 @@ from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
 from mechanics.errors import ContactError, OptionError
+from mechanics.options import EXACT
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._shared import EXACT, output_operand, recording_operand, renderer_operand
+from palpate.operations._shared import output_operand, recording_operand, renderer_operand
 from palpate.operations.read_recording import read_recording
 from palpate.operations.renderer import touched_scene
 from render.options import RenderOptions
@@ -49,15 +50,10 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     mask `contact`, and the error rmse_n, N, over it. The same input gives the same bits. Raises OptionError,
     and ContactError for a recording that lies far from the model.
     """
+    from mechanics.press_solver.solved_places import deepest_of_sites, said_beforehand
     from reconstruct.presses_on_model import check_near
     from reconstruct.steps.s3_contacts.quasi_static import is_points
-    from render.exact import (
-        ExactPlaces,
-        check_renderer,
-        deepest_of_sites,
-        exact_replay,
-        said_beforehand,
-    )
+    from render.exact import ExactPlaces, check_renderer, exact_replay
     from render.replay import ReplayResult, replay_error, replay_recording
 
     if asked.exact:
@@ -76,9 +72,10 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     presses, exact = _touched(measured, scene.model), None
     if asked.exact:
         places = ExactPlaces(scene.renderer, measured.tip_radius_m)
-        call.out.say(f"--exact: {said_beforehand(len(deepest_of_sites(presses)))}")
+        sites = deepest_of_sites(presses.site, presses.deepest)
+        call.out.say(f"--exact: {said_beforehand(len(sites))}")
         with call.progress("solving") as tell:
-            exact = exact_replay(places, presses, measured.t, measured.position, forces, tell)
+            exact = exact_replay(places, presses, sites, measured.t, measured.position, forces, tell)
         forces = exact.force_n
     error = replay_error(measured, presses, forces)
     return ReplayResult(

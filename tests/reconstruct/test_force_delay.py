@@ -1,8 +1,11 @@
 """A force that reads late: found, corrected, and never seen where the force is on time."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+from mechanics.recording.recording import Recording
 from reconstruct.steps.s3_contacts import contacts
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore, read_earlier
 from reconstruct.steps.s3_contacts.force_delay import Delay
@@ -69,3 +72,34 @@ def test_a_delay_smaller_than_twice_its_error_is_not_corrected_and_said(on_time,
     assert np.array_equal(exploration.presses.onset_s, plain.presses.onset_s)
     (words,) = exploration.dropped
     assert "-45 +- 239 ms late" in words and "not corrected" in words
+
+
+def with_gaps(recording: Recording) -> Recording:
+    """As a busy program writes it: a third of the samples missing, 15 ms at a time."""
+    rng = np.random.default_rng(3)
+    kept = np.ones(len(recording.t), dtype=bool)
+    lost = round(0.015 * recording.sample_rate_hz)
+    for first in rng.choice(len(kept) - lost - 1, len(kept) // (3 * lost), replace=False) + 1:
+        kept[first : first + lost] = False
+    return dataclasses.replace(
+        recording, t=recording.t[kept], position=recording.position[kept],
+        force_on_tool=recording.force_on_tool[kept],
+    )  # fmt: skip
+
+
+def test_missing_samples_move_no_force_in_time(on_time):
+    gappy = with_gaps(on_time)
+    earlier = read_earlier(gappy, 0.05)
+    held = np.isin(np.round(gappy.t + 0.05, 6), np.round(gappy.t, 6))
+    at = np.searchsorted(on_time.t, gappy.t[held] + 0.05 - 1e-6)
+    np.testing.assert_array_equal(earlier.force_on_tool[held], on_time.force_on_tool[at])
+    between = np.interp(gappy.t + 0.05, gappy.t, gappy.force_on_tool[:, 2])
+    np.testing.assert_allclose(earlier.force_on_tool[~held, 2], between[~held], atol=1e-9)
+
+
+def test_a_delay_is_found_where_samples_are_missing(on_time):
+    gappy = with_gaps(read_earlier(on_time, -0.02))
+    exploration = explore(gappy)
+    assert exploration.delay_s == pytest.approx(0.02, abs=max(4 * exploration.delay_error_s, 0.001))
+    assert abs(shift_of_first_touch(exploration)) < 1.5e-4
+    assert explore(with_gaps(on_time)).delay_s == 0

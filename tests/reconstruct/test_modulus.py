@@ -67,6 +67,21 @@ def test_modulus_law_and_onset_are_recovered(block):
         assert fit.ci95_pa[1] / fit.ci95_pa[0] < 1.09  # 1.082 is the common error alone
 
 
+def test_a_press_that_does_not_follow_the_law_says_how_unsure_it_is(block):
+    """As where a busy program leaps over the first touch: nobody saw it."""
+    _, sites = block
+    presses = pressed(sites, onset=1e-6)
+    onset_m = np.where(np.arange(len(sites)) == 3, 3e-3, 0.0)
+    leapt = dataclasses.replace(
+        presses, centre=presses.centre + onset_m[:, None] * presses.normal,
+        onset_error_m=presses.onset_error_m + onset_m,
+    )  # fmt: skip
+    fit = fit_law(press_data(leapt), sites, TIP, "neo-hookean", 0.02, 0.03, NOISE)
+    off, error = abs(np.log(fit.modulus_pa / E)), fit.relative_error
+    assert off[3] > 0.2 and off[3] < 3 * error[3]
+    assert (np.delete(error, 3) < 0.02).all()
+
+
 def test_a_wrong_first_touch_costs_little_because_it_is_fitted(block):
     _, sites = block
     good = fit_modulus(pressed(sites, onset=1e-6), sites, NOISE)

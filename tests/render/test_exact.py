@@ -12,9 +12,11 @@ import pytest
 import render.exact
 from mechanics.errors import OptionError
 from mechanics.model.files import write_model
+from mechanics.press_solver import solved_places
 from mechanics.press_solver.press import PressOptions
+from mechanics.press_solver.solved_places import SolvedPlace, deepest_of_sites
 from palpate.cli import main
-from render.exact import ExactPlaces, SolvedPlace, exact_replay, press_options
+from render.exact import ExactPlaces, exact_replay, press_options
 from render.press import Stroke, press, solved
 
 from . import shapes
@@ -31,7 +33,7 @@ def kept(tmp_path_factory):
 @pytest.fixture
 def exact(cylinder_renderer, kept, monkeypatch):
     """Coarse solutions beside the cylinder's law."""
-    monkeypatch.setattr(render.exact, "cache_folder", lambda: kept)
+    monkeypatch.setattr(solved_places, "cache_folder", lambda: kept)
     return ExactPlaces(cylinder_renderer, options=COARSE)
 
 
@@ -48,7 +50,7 @@ def test_a_solved_press_lies_beside_the_law_and_is_kept(cylinder_renderer, exact
     def unasked(*_):
         raise AssertionError("solved twice")
 
-    monkeypatch.setattr(exact._solver, "press", unasked)
+    monkeypatch.setattr(exact._presses.solver, "press", unasked)
     again = solved(curve, exact)
     np.testing.assert_array_equal(again.exact.solved_n, by.exact.solved_n)
 
@@ -88,7 +90,8 @@ def test_a_replay_is_corrected_where_it_touches_and_unsolved_sites_keep_the_law(
             return a_place(1.1) if len(asked) == 1 else None
 
     force = np.ones((len(t), 3))
-    found = exact_replay(Places(), presses, t, position, force)
+    sites = deepest_of_sites(presses.site, presses.deepest)
+    found = exact_replay(Places(), presses, sites, t, position, force)
     assert found.unsolved == 1 and len(found.places) == 1
     assert asked == [4e-3, 2e-3]  # once a site, at its deepest
     first = ((t >= 1) & (t < 3)) | ((t >= 7) & (t < 8.9))
@@ -106,7 +109,7 @@ def test_what_the_solver_does_not_know_is_refused(cylinder_renderer):
 
 
 def test_the_command_says_law_solution_and_bound(kept, monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(render.exact, "cache_folder", lambda: kept)
+    monkeypatch.setattr(solved_places, "cache_folder", lambda: kept)
     monkeypatch.setattr(render.exact, "press_options", lambda renderer: COARSE)
     folder = str(write_model(tmp_path / "block", shapes.model(shapes.block((0.06, 0.06, 0.03), (4, 4, 2)))))
     result = tmp_path / "press.json"

@@ -241,6 +241,8 @@ def lines(result: Diagnosis) -> list[str]:
     _, sure, _ = _how_sure(result)
     text.append(f"how sure: {_small(sure)}")
     text += [f"  {reason}" for reason in result.reasons]
+    if result.exact is not None:
+        text.append(f"touched places are solved: {result.exact.said}")
     if result.next_touch is not None and result.unsettled:
         text.append(f"next touch: {touch_words(result)}")
     if result.left_out:

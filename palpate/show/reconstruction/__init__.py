@@ -9,6 +9,7 @@ import numpy as np
 from palpate.show import model as made
 from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.reconstruction.page import lost, meaning, next_steps, report, tell, view
+from reconstruct.methods import Solved
 from reconstruct.pipeline import Reconstruction
 from reconstruct.steps.s7_modulus.held_out import HeldOut
 
@@ -46,6 +47,8 @@ def lines(result: Reconstruction) -> list[str]:
     ]
     if result.modulus:
         lines.append(f"modulus: {result.modulus.reason}")
+    if result.exact:
+        lines.append(_solved(result.exact))
     if exploration.delay_s:
         lines.append(
             f"the force reads {exploration.delay_s * 1e3:.0f} +- {exploration.delay_error_s * 1e3:.1f} "
@@ -103,9 +106,19 @@ def as_json(result: Reconstruction) -> dict[str, Any]:
             "between_sites": fit.between,
             "shape_error": fit.shape_error,
         }
+    if result.exact:
+        by_table = {"young_modulus_by_table_pa": result.exact.by_table.modulus_pa}
+        figures["exact"] = {**by_table, **result.exact.presses.as_json()}
     if result.paper_fit:
         figures["not_used"] = [{"t_s": t, "reason": reason} for t, reason in result.paper_fit.not_used]
     return figures
+
+
+def _solved(exact: Solved) -> str:
+    """What solving the touched places changed."""
+    return (
+        f"  by the law's table it would be {exact.by_table.modulus_pa / 1e3:.2f} kPa ({exact.presses.said})"
+    )
 
 
 def _held_out(told: HeldOut | None) -> dict[str, Any]:

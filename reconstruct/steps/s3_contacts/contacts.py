@@ -182,8 +182,20 @@ def _is_far(late: Delay) -> bool:
 
 def read_earlier(recording: Recording, delay_s: float) -> Recording:
     """The recording with its force shifted earlier by `delay_s`, to whole samples; the ends are repeated."""
-    rows = np.arange(len(recording.t)) + round(delay_s * recording.sample_rate_hz)
-    return replace(recording, force_on_tool=recording.force_on_tool[np.clip(rows, 0, len(rows) - 1)])
+    force = _later(recording.t, recording.force_on_tool, delay_s, recording.sample_rate_hz)
+    return replace(recording, force_on_tool=force)
+
+
+def _later(t: np.ndarray, values: np.ndarray, seconds: float, rate_hz: float) -> np.ndarray:
+    """Values (n, k) at t (n,) s as they are so much later, to whole samples; between samples where some are
+    missing, as a busy program leaves them out. The ends are repeated."""
+    at = t + seconds
+    rows = np.clip(np.searchsorted(t, at - 0.5 / rate_hz), 0, len(t) - 1)
+    found = values[rows]
+    missing = np.flatnonzero((t[rows] - at > 0.5 / rate_hz) & (rows > 0))
+    for axis in range(values.shape[1]):
+        found[missing, axis] = np.interp(at[missing], t, values[:, axis])
+    return found
 
 
 def _tabled(
@@ -199,7 +211,6 @@ def _tabled(
     """
     signals, contacts, (delay_s, delay_error_s) = found.spans.filtered.signals, found.touches, delay
     t, first_last = recording.t, found.boundary.interval
-    late = np.clip(np.arange(len(t)) - round(delay_s * recording.sample_rate_hz), 0, len(t) - 1)
     presses = cut(
         recording,
         FoundPresses(
@@ -214,7 +225,7 @@ def _tabled(
             kinds=["cycle" if c.unbroken else "press" for c in contacts],
         ),
         FoundAround(
-            free_air=found.spans.filtered.free_air[late],
+            free_air=_later(t, found.spans.filtered.free_air, -delay_s, recording.sample_rate_hz),
             trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
             others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
             supported=found.supported,

@@ -122,10 +122,10 @@ def _gap_and_speed(signals: Signals, contact: Touch) -> tuple[float, float, floa
     )
     lost = int(np.argmin(np.abs(travel - rise.u0_m)))
     beside = float(np.linalg.norm(moved[lost] + travel[lost] * normal))
-    half = max(1, int(_SPEED_S * rate / 2))
-    approach = -(signals.position[max(contact.start - half, 0) : contact.start + half]) @ normal
-    withdrawal = travel[max(lost - half, 0) : lost + half]
-    speeds = [np.ptp(x) * rate / max(len(x) - 1, 1) for x in (approach, withdrawal)]
+    half, t = max(1, int(_SPEED_S * rate / 2)), signals.recording.t
+    around = [slice(max(k - half, 0), k + half) for k in (contact.start, contact.peak + first + lost)]
+    # by the clock: a busy program leaves samples out
+    speeds = [np.ptp(signals.position[a] @ normal) / max(np.ptp(t[a]), 1 / rate) for a in around]
     if beside > _SIDEWAYS_M or min(speeds) <= 0:
         return None
     return -rise.u0_m, float(np.hypot(rise.u0_error_m, contact.onset_error_m)), sum(speeds)

@@ -9,15 +9,17 @@ that place's errors), of dent laws as often as resampled sites choose them, of t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.stats import t as student
 from scipy.stats import theilslopes
 
 from mechanics.compliance.sites import TouchSites
+from mechanics.contact.depth_factors import DepthFactors
 from mechanics.errors import OptionError
-from mechanics.options import option
+from mechanics.options import EXACT, option
 from mechanics.presses.table import Presses
 from mechanics.robust import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
 from reconstruct.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
@@ -51,6 +53,7 @@ class ModulusOptions:
         0.02, "standard error common to all presses (law, mesh), as a share of the modulus", flag="--law-bias"
     )
     bootstraps: int = option(1000, "resamples of the sites that choose a dent law", flag="--bootstraps")
+    exact: bool = option(False, EXACT)
 
     def __post_init__(self) -> None:
         """Raises OptionError for a depth that is not positive, errors below 0, or fewer than 20 resamples."""
@@ -92,25 +95,28 @@ def fit_modulus(
     options: ModulusOptions | None = None,
     *,
     compliance_covariance: np.ndarray | None = None,
+    exact: Mapping[str, DepthFactors] | None = None,
     seed: int = 0,
 ) -> ModulusFit:
     """The global modulus of presses that touch at `sites` (one a press, in order).
 
     noise_n: N, standard deviation of a raw force component. compliance_covariance: (k, k) 1/m^2 from the
-    shape's uncertainty (reconstruct.steps.s7_modulus.shape_error), or None.
+    shape's uncertainty (reconstruct.steps.s7_modulus.shape_error), or None. exact: solved places of the
+    presses by the dent's law; no other law is weighed then.
     """
     options = options or ModulusOptions()
     radius, data, site = presses.tip_radius_m, press_data(presses), presses.site
     along = np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)
     deepest = float(presses.depth_m.max()) + 1e-3
+    laws = AUTO_LAWS if options.law == "auto" else (options.law,)
+    at = {law: sites if exact is None else replace(sites, factors=exact[law]) for law in exact or laws}
 
     def fitted(law: str, depth: float, start: LawFit | None = None) -> LawFit:
-        return fit_law(data, sites, radius, law, depth, options.law_error, noise_n, start)
+        return fit_law(data, at[law], radius, law, depth, options.law_error, noise_n, start)
 
     limit = options.greatest_depth_m or deepest
-    laws = AUTO_LAWS if options.law == "auto" else (options.law,)
     # the law is chosen on all depths, where laws differ most; the modulus where depth does not matter
-    whole = sorted((fitted(law, limit) for law in laws), key=lambda f: f.cost.sum())
+    whole = sorted((fitted(law, limit) for law in at), key=lambda f: f.cost.sum())
     depths: list[tuple[float, float, bool]] = []
     if options.greatest_depth_m is None:
         ladder = [whole[0]]
@@ -120,12 +126,12 @@ def fit_modulus(
     fits = [fitted(f.law, limit, f) for f in whole]
     shape = None
     if compliance_covariance is not None:
-        slope = far_sensitivity(data, sites, fits[0], radius, options.law_error, noise_n)
+        slope = far_sensitivity(data, at[fits[0].law], fits[0], radius, options.law_error, noise_n)
         shape = slope[:, None] * compliance_covariance * slope
     shares = _law_shares(whole, site, options, seed)
     values = [combine(f.modulus_pa, f.relative_error, site) for f in fits]
     modulus = float(np.exp(sum(s * np.log(v[0]) for s, v in zip(shares, values, strict=True))))
-    logs = _draws(fits, shares, site, options, shape, seed)
+    logs = _draws(fits, shares, site, at[fits[0].law].law_error(options.law_bias), shape, seed)
     low, high = modulus * np.exp(np.percentile(logs - logs.mean(), [2.5, 97.5]))
     weights, between = values[0][1], values[0][2]
     return ModulusFit(
@@ -136,7 +142,7 @@ def fit_modulus(
         site=site,
         between=between,
         shape_error=0.0 if shape is None else float(np.sqrt(weights @ shape @ weights)),
-        reason=_reason(fits, shares, limit, deepest, options),
+        reason=_reason(fits, shares, limit, deepest, options) + ("; touched places solved" if exact else ""),
         by_law={
             f.law: (v[0], float(np.sqrt(np.mean(f.rms_n**2))), s)
             for f, v, s in zip(fits, values, shares, strict=True)
@@ -250,18 +256,19 @@ def _draws(
     fits: list[LawFit],
     shares: list[float],
     site: np.ndarray,
-    options: ModulusOptions,
+    bias: np.ndarray,
     shape: np.ndarray | None,
     seed: int,
 ) -> np.ndarray:
     """(n,) ln of the global modulus as it may be: by law, by chance between sites, by the shape's and the
-    common error."""
+    common error. bias: (k,) of each press, common to all."""
     random = np.random.default_rng(seed)
     drawn = []
     for fit, share in zip(fits, shares, strict=True):
         e, weights, _ = combine(fit.modulus_pa, fit.relative_error, site)
         errors, probability = between_sites(fit.modulus_pa, fit.relative_error, site, weights)
-        common = options.law_bias**2 + (0.0 if shape is None else max(float(weights @ shape @ weights), 0.0))
+        of_shape = 0.0 if shape is None else max(float(weights @ shape @ weights), 0.0)
+        common = float(weights @ bias) ** 2 + of_shape
         count = round(share * _DRAWS)
         chance = random.choice(errors, count, p=probability)
         drawn.append(np.log(e) + np.sqrt(chance**2 + common) * random.standard_normal(count))

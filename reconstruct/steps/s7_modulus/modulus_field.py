@@ -222,7 +222,7 @@ def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> tuple[
     if found is None or not asked_for(found):
         return model, None
     modulus = float(np.exp(found.level))
-    share = float(np.exp(1.96 * np.hypot(found.level_sd, LEVEL_BIAS)))
+    share = float(np.exp(1.96 * np.hypot(found.level_sd, sites.law_error(LEVEL_BIAS).mean())))
     levelled = model.with_material(
         young_modulus_pa=modulus, young_modulus_ci95_pa=(modulus / share, modulus * share)
     )

@@ -20,6 +20,9 @@ from mechanics.presses.table import Presses
 _BLOCK_S = 0.004
 _LEAD_S = 0.03
 _NOTHING = 1e-200  # no press that tells its modulus has a determinant so small
+_FOLLOWS = 3.0
+"""A press whose force misses the law by more than so many times what noise and law explain does not follow it
+(a tip that leapt over its first touch): its modulus is as unsure as it misses."""
 _CORRELATED, _STRETCHES = 10, 10
 """A lasting error of the law binds so many rows of a press together, where they are a tenth of it or less:
 it lasts for a tenth of a press at most, so that few rows far apart are independent."""
@@ -69,8 +72,8 @@ def fit_law(
     """Modulus and onset shift of every press from its samples shallower than `depth_m`.
 
     data: `press_data`. noise_n: N, standard deviation of a raw force component. start: an earlier fit whose
-    onset shifts are a good guess. law_error: error of the law as a share of the force; a sample's variance is
-    noise^2 + (law_error |f|)^2.
+    onset shifts are a good guess. law_error: error of the law as a share of the force, where the place is not
+    solved (TouchSites.law_error); a sample's variance is noise^2 + (law_error |f|)^2.
     """
     press, k = data.press, len(sites)
     noise_n = noise_n / np.sqrt(data.block)
@@ -78,7 +81,8 @@ def fit_law(
     normals = sites.normals[press]
     used = -np.einsum("ij,ij->i", data.displacement, normals) < depth_m
     squared_force = np.einsum("ij,ij->i", data.force, data.force)
-    weight = np.where(used, 1.0 / (noise_n**2 + law_error**2 * squared_force / 3), 0.0)
+    share = sites.law_error(law_error)[press]
+    weight = np.where(used, 1.0 / (noise_n**2 + share**2 * squared_force / 3), 0.0)
 
     def unit(shift: np.ndarray) -> np.ndarray:
         return forces_at(
@@ -122,7 +126,14 @@ def fit_law(
     error = np.full(k, np.inf)
     bound = np.clip(np.diff(data.starts) / _STRETCHES, 1, _CORRELATED)
     error[known] = np.sqrt((bound * scale * a_uu)[known] / det[known]) / e[known]
-    return LawFit(law, depth_m, e, error, shift, np.sqrt(squared / np.maximum(rows, 1)), cost, rows)
+    rms = np.sqrt(squared / np.maximum(rows, 1))
+    felt = np.sqrt(np.bincount(press, weights=used * squared_force, minlength=k) / np.maximum(rows, 1))
+    missed = rms / np.maximum(felt, 1e-300)
+    follows = missed < _FOLLOWS * np.hypot(
+        sites.law_error(law_error), np.sqrt(3) * noise_n / felt.clip(1e-300)
+    )
+    error = np.where(follows, error, np.maximum(error, missed))
+    return LawFit(law, depth_m, e, error, shift, rms, cost, rows)
 
 
 CARRIED_BACK = ("points", "cycle")
