@@ -3,6 +3,9 @@
 A small block is pressed by each simulator as resolved as it can be afforded here (its control), and with
 one or two of its settings changed. What a change does is measured: the force with it less the force without.
 Every run is kept by all that it depends on, so a benchmark can be resumed.
+
+A parameter is given so wrongly that our law's force changes by a drawn multiple (TIMES) of what can be seen,
+or as much as it can. What a setting does is known only once it was run: its strength is drawn from a range.
 """
 
 from __future__ import annotations
@@ -10,7 +13,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import tempfile
-from collections.abc import Callable
 from contextlib import chdir
 from dataclasses import dataclass, field
 from functools import cache
@@ -20,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._simulated_flaws import MODULUS_PA, RADIUS_M, Block, Given, Layout
+from benchmarks._simulated_flaws import MODULUS_PA, NOISE_N, RADIUS_M, Block, Given, Layout
 from diagnose.other_simulator.stated import Stated
 from mechanics.disk.store import content_key
 from mechanics.disk.writing import atomic_file
@@ -45,7 +47,7 @@ LAYOUT = Layout(
     depths_m=(0.0012, 0.0018, 0.0024),
     speeds_m_per_s=(0.02, 0.04, 0.08),
     holds_s=(0.03, 0.08),
-    across_m=0.0004,
+    across_m=0.0006,
     rest_s=(0.2, 0.15),
     poisson=POISSON,
 )
@@ -83,79 +85,121 @@ _FIELDS = {"cells", "modulus_pa", "poisson", "friction", "radius_m"}
 _WHOLE = {"edge_radii": math.inf}
 CONTROLS = {
     "scikit-fem": Simulation(14, _WHOLE),
-    "mujoco": Simulation(14, _WHOLE),
-    "drake": Simulation(12, _WHOLE | {"timestep_s": 0.004, "sphere_radii": 0.4}),
-    "newton": Simulation(12, _WHOLE | {"timestep_s": 0.002}),
+    "mujoco": Simulation(10, _WHOLE | {"timestep_s": 0.002}),
+    "drake": Simulation(9, _WHOLE | {"timestep_s": 0.004, "sphere_radii": 0.4}),
+    "newton": Simulation(9, _WHOLE | {"timestep_s": 0.002}),
 }
-"""One mesh serves all presses of a run: a finer one under each costs twenty times as much."""
+"""One mesh serves all presses of a run: a finer one under each costs twenty times as much. So where elements
+are linear a control is much too stiff, and is told so."""
+
+
+TIMES = (2.0, 20.0)
+"""Multiples of what can be seen of a parameter, least and greatest."""
+FORCE_SHARE, NOISE_SHARE = 0.02, 0.5
+"""Of the force, and of the noise: what of a change of force can be seen at least (`--smallest`)."""
+WRONG: dict[str, tuple[tuple[float, ...], ...]] = {
+    "poisson": ((POISSON, 0.35, 0.3, 0.2, 0.1),),
+    "modulus_pa": (
+        tuple(MODULUS_PA * x for x in (1.0, 1.1, 1.3, 1.6, 2.0, 3.0)),
+        tuple(MODULUS_PA * x for x in (1.0, 0.9, 0.75, 0.6, 0.45, 0.3)),
+    ),
+    "friction": ((STICKS, 0.3, 0.2, 0.1, 0.05, 0.02),),
+    "radius_m": (
+        tuple(RADIUS_M * x for x in (1.0, 1.02, 1.05, 1.1, 1.2, 1.35)),
+        tuple(RADIUS_M * x for x in (1.0, 0.98, 0.95, 0.9, 0.83, 0.75)),
+    ),
+}
+"""What each parameter is given in place of what is right, the least wrong first; to one side or the other."""
+
+
+class Parameters:
+    """What our law's force changes by where a parameter is given wrongly."""
+
+    def __init__(self, block: Block) -> None:
+        self._block, self._law = block, block.force(Given(poisson=POISSON))
+        self._pressed = self._law.any(axis=1)
+        self.visible_n = max(FORCE_SHARE * self._rms(self._law), NOISE_SHARE * math.sqrt(3) * NOISE_N)
+        self._sizes: dict[tuple[str, int], list[float]] = {}
+
+    def _rms(self, force: np.ndarray) -> float:
+        return float(np.sqrt((force[self._pressed] ** 2).sum(axis=1).mean()))
+
+    def sizes_n(self, field: str, side: int) -> list[float]:
+        """N rms, of each of WRONG[field][side]."""
+        if (field, side) not in self._sizes:
+            given = [{"poisson": POISSON, field: value} for value in WRONG[field][side][1:]]
+            off = [self._rms(self._block.force(Given(**each)) - self._law) for each in given]
+            self._sizes[field, side] = [0.0, *off]
+        return self._sizes[field, side]
+
+    def wrong_by(self, field: str, side: int, times: float) -> float:
+        """The value whose change is so many times what can be seen, or the wrongest of WRONG."""
+        return float(np.interp(times * self.visible_n, self.sizes_n(field, side), WRONG[field][side]))
 
 
 @dataclass(frozen=True)
 class AdapterFlaw:
-    """right: the names that say it. draw(adapter, rng): what is changed; None where that simulator has no
-    such setting."""
+    """right: the names that say it. parameter: the field that is given wrongly. settings: by adapter the
+    setting that is made worse, and from where to where; without both the mesh is made coarser."""
 
     name: str
     right: tuple[str, ...]
-    draw: Callable[[str, np.random.Generator], dict[str, float] | None]
+    parameter: str | None = None
+    settings: dict[str, tuple[str, float, float]] | None = None
 
+    def of(self, adapter: str) -> bool:
+        """Whether that simulator can have it."""
+        return self.settings is None or adapter in self.settings
 
-def _within(rng: np.random.Generator, low: float, high: float, *, either: bool = False) -> float:
-    value = float(np.exp(rng.uniform(math.log(low), math.log(high))))
-    return 1 / value if either and rng.random() < 0.5 else value
-
-
-def _setting(ranges: dict[str, tuple[str, float, float]]) -> Any:
-    def draw(adapter: str, rng: np.random.Generator) -> dict[str, float] | None:
-        if adapter not in ranges:
-            return None
-        key, low, high = ranges[adapter]
+    def draw(self, adapter: str, rng: np.random.Generator, parameters: Parameters) -> dict[str, float]:
+        """What is changed."""
+        if self.parameter is not None:
+            side = int(rng.integers(len(WRONG[self.parameter])))
+            return {self.parameter: parameters.wrong_by(self.parameter, side, _within(rng, *TIMES))}
+        if self.settings is None:
+            return {"cells": int(rng.integers(4, 9))}
+        key, low, high = self.settings[adapter]
         return {key: _within(rng, low, high)}
 
-    return draw
+
+def _within(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(math.log(low), math.log(high))))
 
 
 FLAWS: tuple[AdapterFlaw, ...] = (
-    AdapterFlaw(
-        "element size",
-        ("mesh_stiffness", "contact_nodes"),
-        lambda adapter, rng: {"cells": int(rng.integers(4, 9))},
-    ),
+    AdapterFlaw("element size", ("mesh_stiffness", "contact_nodes")),
     AdapterFlaw(
         "contact stiffness",
         ("contact_stiffness", "tunnelling"),
-        _setting({"scikit-fem": ("penalty", 0.3, 4.0), "mujoco": ("solref_s", 0.008, 0.03),
-                  "newton": ("contact_n_per_m", 50.0, 600.0)}),
+        settings={
+            "scikit-fem": ("penalty", 0.3, 4.0),
+            "mujoco": ("solref_s", 0.008, 0.03),
+            "newton": ("contact_n_per_m", 50.0, 600.0),
+        },
     ),
     AdapterFlaw(
         "damping",
         ("numerical_damping",),
-        _setting({"mujoco": ("damping_s", 0.01, 0.06), "drake": ("damping_s", 0.01, 0.06),
-                  "newton": ("damping_s", 0.003, 0.03)}),
+        settings={
+            "mujoco": ("damping_s", 0.01, 0.06),
+            "drake": ("damping_s", 0.01, 0.06),
+            "newton": ("damping_s", 0.003, 0.03),
+        },
     ),
     AdapterFlaw(
         "time step",
         ("time_step", "numerical_damping"),
-        _setting({"mujoco": ("timestep_s", 0.003, 0.008), "drake": ("timestep_s", 0.01, 0.03),
-                  "newton": ("timestep_s", 0.004, 0.016)}),
+        settings={
+            "mujoco": ("timestep_s", 0.003, 0.008),
+            "drake": ("timestep_s", 0.01, 0.03),
+            "newton": ("timestep_s", 0.004, 0.016),
+        },
     ),
-    AdapterFlaw(
-        "poisson", ("stated_poisson_ratio",), lambda adapter, rng: {"poisson": float(rng.choice([0.1, 0.2]))}
-    ),
-    AdapterFlaw(
-        "modulus",
-        ("stated_modulus",),
-        lambda adapter, rng: {"modulus_pa": MODULUS_PA * _within(rng, 1.15, 2.0, either=True)},
-    ),
-    AdapterFlaw(
-        "friction", ("stated_friction",), lambda adapter, rng: {"friction": _within(rng, 0.03, 0.12)}
-    ),
-    AdapterFlaw(
-        "tip",
-        ("stated_tip_radius",),
-        lambda adapter, rng: {"radius_m": RADIUS_M * _within(rng, 1.05, 1.2, either=True)},
-    ),
-)  # fmt: skip
+    AdapterFlaw("poisson", ("stated_poisson_ratio",), "poisson"),
+    AdapterFlaw("modulus", ("stated_modulus",), "modulus_pa"),
+    AdapterFlaw("friction", ("stated_friction",), "friction"),
+    AdapterFlaw("tip", ("stated_tip_radius",), "radius_m"),
+)
 
 
 def squeezed_mesh(cells: int) -> TetMesh:
@@ -219,17 +263,13 @@ class Runs:
 
 
 def drawn_plan(
-    adapter: str, rng: np.random.Generator, singles: int, pairs: int
+    adapter: str, rng: np.random.Generator, singles: int, pairs: int, parameters: Parameters
 ) -> list[tuple[tuple[AdapterFlaw, dict[str, float]], ...]]:
     """Cases of one flaw, of each kind in turn, and of two: two of the single ones at once, so that each alone
     is run already."""
-    able = [flaw for flaw in FLAWS if flaw.draw(adapter, np.random.default_rng(0)) is not None]
-    alone = []
-    for k in range(singles):
-        flaw = able[k % len(able)]
-        change = flaw.draw(adapter, rng)
-        assert change is not None
-        alone.append((flaw, change))
+    able = [flaw for flaw in FLAWS if flaw.of(adapter)]
+    kinds = [able[k % len(able)] for k in range(singles)]
+    alone = [(flaw, flaw.draw(adapter, rng, parameters)) for flaw in kinds]
     both: list[tuple[Any, ...]] = []
     while len(both) < pairs and len({flaw.name for flaw, _ in alone}) > 1:
         one, two = sorted(rng.choice(len(alone), 2, replace=False))

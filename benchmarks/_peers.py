@@ -184,7 +184,7 @@ class Flex(Peer):
             began = time.process_time()
             for k in range(count):
                 now = last + (depth - last) * min(1.0, 2.0 * (k + 1) / count)
-                data.mocap_pos[0] = point + (self.radius_m - now) * normal
+                data.qpos[:3], data.qvel[:3] = point + (self.radius_m - now) * normal, 0.0
                 self.mujoco.mj_step(self.model, data)
             self.step_s, self.steps, last = (
                 self.step_s + time.process_time() - began,

@@ -22,7 +22,7 @@ from __future__ import annotations
 import argparse
 import json
 import secrets
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._adapter_flaws import ALIKE, CONTROLS, AdapterFlaw, Runs, drawn_plan
+from benchmarks._adapter_flaws import ALIKE, CONTROLS, LAYOUT, AdapterFlaw, Parameters, Runs, drawn_plan
 from benchmarks._simulated_flaws import FLAWS, Block, Flaw, Given, simulated
 from benchmarks._simulated_scores import figures_of, print_cases
 from benchmarks.timing import table
@@ -52,6 +52,7 @@ LATE_S = 0.03
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """How many cases of each kind."""
+    parser.add_argument("--kept", action="store_true", help="judge nothing, count what lies in --work")
     parser.add_argument("--singles", type=int, default=39, help="cases with one flaw")
     parser.add_argument("--pairs", type=int, default=12, help="cases with two")
     parser.add_argument("--controls", type=int, default=12, help="cases with none")
@@ -111,8 +112,11 @@ class _Case:
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Plant, seal, judge, open; print what was found."""
     if arguments.adapter is not None:
-        said = [_run_adapter(adapter, arguments) for adapter in arguments.adapter]
+        worlds = cache(lambda number: _world(Block(0, LAYOUT), number % 2 == 1, number))
+        said = [_run_adapter(adapter, arguments, worlds) for adapter in arguments.adapter]
         return {key: [each for one in said for each in one[key]] for key in ("figures", "cases")}
+    if arguments.kept:
+        return _said(list(_kept(arguments.work).values()))
     block = Block()
     world = cache(lambda late: _world(block, late))
     drawn = np.random.default_rng(arguments.seed)
@@ -132,14 +136,19 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     return _said(list(rows.values()))
 
 
-def _run_adapter(adapter: str, arguments: argparse.Namespace) -> dict[str, Any]:
-    """The same with flaws planted in a simulator (`_adapter_flaws`), whose control comes first."""
+def _run_adapter(
+    adapter: str, arguments: argparse.Namespace, worlds: Callable[[int], _Reality]
+) -> dict[str, Any]:
+    """The same with flaws planted in a simulator (`_adapter_flaws`), whose control comes first. worlds: by
+    number, diagnosed where it is asked for; that of odd ones has a late sensor."""
     work = arguments.work
+    rows = _kept(work, f"{adapter}-")
+    if arguments.kept:
+        return _said(list(rows.values()), f"{adapter}: ")
     runs = Runs(None if work is None else work / "runs")
     rng = np.random.default_rng(arguments.seed)
-    plan = drawn_plan(adapter, rng, arguments.singles, arguments.pairs)
-    worlds = [_world(runs.block, late, k) for k, late in enumerate((False, True))]
-    rows = _kept(work, f"{adapter}-")
+    parameters = Parameters(runs.block)
+    plan = drawn_plan(adapter, rng, arguments.singles, arguments.pairs, parameters)
     own: list[str] = []
     gaps: dict[str, float] = {}
     cases = [((), k) for k in range(max(arguments.controls, 1))] + [(p, 0) for p in plan]
@@ -148,8 +157,7 @@ def _run_adapter(adapter: str, arguments: argparse.Namespace) -> dict[str, Any]:
             tell("cases", number / len(cases))
             name = f"{adapter}-{arguments.seed}-{number}"
             if name not in rows:
-                world = worlds[k % 2] if k < 2 else _world(runs.block, k % 2 == 1, k)
-                rows[name] = _adapter_row(runs, adapter, world, planted, own, gaps)
+                rows[name] = _adapter_row(runs, adapter, worlds(k), planted, own, gaps)
                 _keep(work, name, rows[name])
             if number == 0:
                 own = rows[name]["named"]

@@ -24,7 +24,9 @@ def lost(signal: Signal) -> tuple[np.ndarray, np.ndarray]:
         if len(size) < 5 or not size.max() > 0:
             continue
         step = float(np.median(np.diff(signal.t[part])))
-        around = grey_closing(size, 2 * max(1, round(LONGEST_S / step / 2)) + 1)
+        half = max(1, round(LONGEST_S / step / 2))
+        # before and after a press there is no force: what rises late or falls early has lost nothing
+        around = grey_closing(np.pad(size, 2 * half), 2 * half + 1)[2 * half : -2 * half]
         own = around > LEAST_SHARE * size.max()
         gone[part] = own & (size < FELL_TO * around)
         held[part] = own

@@ -70,6 +70,8 @@ PARAMETER_OF = {
     "stated_tip_radius": "tip_radius_m",
 }
 """Name in an answer -> field of Stated."""
+INSTRUMENT = "instrument"
+"""Domain of effects that change a reading and nothing of the object."""
 ALSO_PARAMETERS = (POISSON.name, SLIP.name, TIP.name)
 """Effects of a diagnosis that say a parameter which a simulator is given."""
 
@@ -77,12 +79,15 @@ ALSO_PARAMETERS = (POISSON.name, SLIP.name, TIP.name)
 @dataclass(frozen=True)
 class Reality:
     """The real side, at all of its touches' rows: ideal and full model as `HeldOut`, with the readings that
-    the instrument adds put back onto the measured force (n, 3) N. names: of the effects between the two."""
+    the instrument adds put back onto the measured force (n, 3) N. names: of the effects between the two.
+    modulus: (n,) Pa, of the ideal model read by the instrument as it is: a late sensor makes no object
+    softer."""
 
     measured: np.ndarray
     ideal: HeldOut
     full: HeldOut
     names: tuple[str, ...]
+    modulus: np.ndarray
 
 
 def reality_of(findings: Findings, named: Sequence[str], strain: Sequence[Effect]) -> Reality:
@@ -101,7 +106,12 @@ def reality_of(findings: Findings, named: Sequence[str], strain: Sequence[Effect
     if offsets.names:
         taken = offsets.residual if set(offsets.names) <= set(named) else np.zeros_like(offsets.residual)
         whole = dataclasses.replace(whole, force=whole.force + taken)
-    return Reality(t.local_force + offsets.residual, own, whole, names)
+    reading = [e for e in final.effects if e.name in names and e.domain == INSTRUMENT]
+    modulus = own.modulus
+    if reading:
+        read = search.judge([*strain, *also, *reading], like=findings.found.final)
+        modulus = held_out(search, read.found).modulus
+    return Reality(t.local_force + offsets.residual, own, whole, names, modulus)
 
 
 def law_at(forward: StatedForward, stated: Stated, numerics: Numerics) -> np.ndarray:

@@ -128,7 +128,7 @@ def _weighed(
     weighing = Weighing(
         np.where(t.counted, t.site[t.press], -1), findings.forward.touches.thinned_away, reality.noise_n
     )
-    modulus = real.ideal.modulus[rows]
+    modulus = real.modulus[rows]
     measured = measured_parameters(findings, asked.stated, float(np.median(modulus)), named)
     start = real.measured[rows] - sides.raw
     first = start + numerics.force["all"]

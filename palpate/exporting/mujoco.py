@@ -28,7 +28,7 @@ def text_of(subject: Subject) -> str:
     pressed = " ".join(f"{value:.9g}" for value in subject.pressed)
     return f"""<!-- {subject.label} -->
 <mujoco model="palpate">
-<option timestep="{TIMESTEP_S:g}" gravity="0 0 0" integrator="discrete" solver="CG"/>
+<option timestep="{TIMESTEP_S:g}" gravity="0 0 0" integrator="discrete" solver="CG" cone="elliptic"/>
 <size memory="1G"/>
 <statistic center="{_row(middle)}" extent="{span:.6g}"/>
 <custom><text name="pressed" data="{pressed}"/></custom>

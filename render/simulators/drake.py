@@ -30,15 +30,17 @@ HEAVY_KG = 1e6
 @dataclass(frozen=True)
 class Settings:
     """timestep_s; damping_s: stiffness damping of the object; sphere_radii: edges of the sphere's mesh, in
-    its radii; edge_radii: edges of the object under the tip, in its radii, inf as the model has them."""
+    its radii; edge_radii: edges of the object under the tip, in its radii, inf as the model has them;
+    relaxation_s: of the contact, as SAP has it; inf: as documented."""
 
     timestep_s: float
     damping_s: float
     sphere_radii: float
     edge_radii: float = np.inf
+    relaxation_s: float = np.inf
 
 
-SETTINGS = {DOCUMENTED: Settings(1e-2, 1e-2, 1.0), BEST: Settings(1e-3, 1e-3, 0.15, 0.5)}
+SETTINGS = {DOCUMENTED: Settings(1e-2, 1e-2, 1.0), BEST: Settings(1e-3, 1e-3, 0.15, 0.5, 0.1)}
 
 
 def vtk_text(mesh: TetMesh) -> str:
@@ -108,7 +110,11 @@ class _Scene:
         )
         from pydrake.math import RigidTransform
         from pydrake.multibody.fem import DeformableBodyConfig, MaterialModel
-        from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
+        from pydrake.multibody.plant import (
+            AddMultibodyPlantSceneGraph,
+            CoulombFriction,
+            DiscreteContactApproximation,
+        )
         from pydrake.multibody.tree import SpatialInertia
         from pydrake.systems.framework import DiagramBuilder
 
@@ -116,8 +122,13 @@ class _Scene:
         self.plant, _ = AddMultibodyPlantSceneGraph(builder, own.timestep_s)
         self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
         friction = CoulombFriction(given["friction"], given["friction"])
-        rigid = ProximityProperties()
-        AddContactMaterial(properties=rigid, friction=friction)
+        rigid, soft = ProximityProperties(), ProximityProperties()
+        if np.isfinite(own.relaxation_s):
+            self.plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
+        for properties in (rigid, soft):
+            AddContactMaterial(properties=properties, friction=friction)
+            if np.isfinite(own.relaxation_s):
+                properties.AddProperty("material", "relaxation_time", 0.5 * own.relaxation_s)
         AddRigidHydroelasticProperties(own.sphere_radii * radius_m, rigid)
         heavy = SpatialInertia.SolidSphereWithMass(HEAVY_KG, radius_m)
         self.tip = self.plant.AddRigidBody("tip", heavy)
@@ -129,8 +140,6 @@ class _Scene:
         config.set_mass_damping_coefficient(0.0)
         config.set_stiffness_damping_coefficient(own.damping_s)
         config.set_material_model(MaterialModel.kLinearCorotated)
-        soft = ProximityProperties()
-        AddContactMaterial(properties=soft, friction=friction)
         file = InMemoryMesh(mesh_file=MemoryFile(vtk_text(mesh), ".vtk", "object.vtk"))
         shape = GeometryInstance(RigidTransform(), Mesh(file), "object")
         shape.set_proximity_properties(soft)

@@ -1,4 +1,6 @@
-"""MuJoCo: a flex of linear tetrahedra, its base pinned, and the tip as a mocap sphere.
+"""MuJoCo: a flex of linear tetrahedra, its base pinned, and the tip as a heavy sphere on three slides, which
+is put to its place with its velocity at every step: to friction a mocap body, which has no velocity, stands
+still.
 
 documented: the contact that its documentation has by default (solref 0.02 1) on the model's own mesh. best:
 edges of a third of the tip's radius under it, a contact of solref 0.004 1 and solimp 0.99 0.999, half the
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 POISSON_LIMIT = 0.45
 """Beyond it linear tetrahedra lock, and the solver of the elastic forces does not converge at 0.49."""
 DENSITY_KG_M3 = 1000.0
+HEAVY_KG = 1e3
+"""Of the tip: what it gains of speed within a step by what pushes it is nothing."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,8 @@ class Settings:
     """timestep_s; solref_s, damping_ratio: solref of the contact; impedance, impedance_deep: its solimp;
     damping_s: of the flex's elasticity; edge_radii: edges under the tip, in its radii, inf as the model has
     them; skin_m: radius of the flex, by which its surface stands off; material: 1 Saint Venant-Kirchhoff, as
-    files have it, 2 stable neo-Hookean (elastic3d of an MjSpec)."""
+    files have it, 2 stable neo-Hookean (elastic3d of an MjSpec); friction_ratio: impratio, how much harder
+    friction holds than the contact pushes: at 1 a tip that rests creeps back."""
 
     timestep_s: float
     solref_s: float
@@ -45,11 +50,12 @@ class Settings:
     impedance_deep: float = 0.95
     skin_m: float = 1e-4
     material: float = 1
+    friction_ratio: float = 1.0
 
 
 SETTINGS = {
     DOCUMENTED: Settings(2e-3, 0.02),
-    BEST: Settings(1e-3, 0.004, 1.0, 0.002, 0.35, 0.99, 0.999, 1e-5, 2),
+    BEST: Settings(1e-3, 0.004, 1.0, 0.002, 0.35, 0.99, 0.999, 1e-5, 2, 10.0),
 }
 
 
@@ -65,22 +71,25 @@ def flex_xml(
     impedance: tuple[float, float] = (0.9, 0.95),
     damping_s: float = 0.01,
     skin_m: float = 1e-4,
+    friction_ratio: float = 1.0,
 ) -> str:
-    """An object as a flex with a mocap sphere above its top. Its cones of friction are elliptic: the usual
-    pyramids push back the less the greater the friction is, from 1 on, and at 10 not at all."""
+    """An object as a flex and a sphere whose centre is the first three of qpos. Its cones of friction are
+    elliptic: the usual pyramids push back the less the greater the friction is, from 1 on, and at 10 not at
+    all."""
     points = " ".join(f"{value:.6g}" for value in mesh.points.ravel())
     elements = " ".join(str(node) for node in mesh.tetrahedra.ravel())
     pins = " ".join(str(node) for node in np.flatnonzero(mesh.fixed))
     mass = DENSITY_KG_M3 * float(mesh.volumes.sum())
-    top = mesh.points.max(axis=0)
-    middle = 0.5 * (top + mesh.points.min(axis=0))
     contact = f'solref="{solref[0]:g} {solref[1]:g}" solimp="{impedance[0]:g} {impedance[1]:g} 0.001"'
     return f"""<mujoco>
-<option timestep="{timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG" cone="elliptic"/>
+<option timestep="{timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG" cone="elliptic"
+impratio="{friction_ratio:g}"/>
 <size memory="1G"/>
 <worldbody>
-<body name="tip" mocap="true" pos="{middle[0]} {middle[1]} {top[2] + radius_m + 0.001}">
-<geom type="sphere" size="{radius_m}" condim="3" friction="{friction:g}" {contact}/></body>
+<body name="tip"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
+<joint type="slide" axis="0 0 1"/>
+<geom type="sphere" size="{radius_m}" mass="{HEAVY_KG:g}" condim="3" friction="{friction:g}"
+{contact}/></body>
 <flexcomp name="object" type="direct" dim="3" mass="{mass}" radius="{skin_m:g}"
 point="{points}" element="{elements}">
 <contact condim="3" selfcollide="none" friction="{friction:g}" {contact}/>
@@ -90,7 +99,7 @@ point="{points}" element="{elements}">
 
 
 def force_on_tip(mujoco: Any, model: Any, data: Any) -> np.ndarray:
-    """(3,) N on the mocap sphere, from all contacts."""
+    """(3,) N on the sphere, from all contacts."""
     total, wrench = np.zeros(3), np.zeros(6)
     for c in range(data.ncon):
         contact = data.contact[c]
@@ -141,6 +150,7 @@ class MuJoCo(SteppedAdapter):
             mesh, own.timestep_s, young_pa=given["young_modulus_pa"], poisson=given["poisson_ratio"],
             radius_m=radius_m, friction=self.friction, solref=(own.solref_s, own.damping_ratio),
             impedance=(own.impedance, own.impedance_deep), damping_s=own.damping_s, skin_m=own.skin_m,
+            friction_ratio=own.friction_ratio,
         )  # fmt: skip
         spec = self._mujoco.MjSpec.from_string(xml)
         for flex in spec.flexes:
@@ -152,14 +162,14 @@ class MuJoCo(SteppedAdapter):
 
 
 class _Touch(SteppedWorld):
-    """One touch: the sphere is a mocap body."""
+    """One touch."""
 
     def __init__(self, mujoco: Any, model: Any, tip: np.ndarray) -> None:
         super().__init__(tip, float(model.opt.timestep))
         self._mujoco, self._model, self._data = mujoco, model, mujoco.MjData(model)
 
     def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:
-        self._data.mocap_pos[0] = tip
+        self._data.qpos[:3], self._data.qvel[:3] = tip - velocity * self._timestep_s, velocity
         self._mujoco.mj_step(self._model, self._data)
 
     def force(self) -> np.ndarray:

@@ -128,11 +128,17 @@ class _Touch(SteppedWorld):
         self._scene, self._now, self._then = scene, scene.model.state(), scene.model.state()
 
     def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:
-        scene, pose = self._scene, np.array([[*tip, 0.0, 0.0, 0.0, 1.0]], np.float32)
+        scene = self._scene
+        was, pose = (
+            np.array([[*place, 0.0, 0.0, 0.0, 1.0]], np.float32)
+            for place in (tip - velocity * self._timestep_s, tip)
+        )
         self._now.body_q.assign(pose)
-        self._then.body_q.assign(pose)
         self._now.clear_forces()
         scene.collisions.collide(self._now, scene.contacts)
+        # friction sees how the sphere moves by the poses of the two states
+        self._now.body_q.assign(was)
+        self._then.body_q.assign(pose)
         scene.solver.step(
             self._now, self._then, None, scene.contacts, self._timestep_s, observables=scene.seen
         )

@@ -1,10 +1,13 @@
 """Flaws that are planted in a simulation's forces."""
 
 import numpy as np
+import pytest
 
-from benchmarks._adapter_flaws import CONTROLS, drawn_plan
-from benchmarks._simulated_flaws import FLAWS, MODULUS_PA, RADIUS_M, Block, simulated
+from benchmarks._adapter_flaws import CONTROLS, LAYOUT, POISSON, Parameters, drawn_plan
+from benchmarks._simulated_flaws import FLAWS, MODULUS_PA, RADIUS_M, Block, Given, simulated
 from benchmarks._simulated_scores import new_in
+from benchmarks.simulated import _verdict, _world
+from diagnose.other_simulator.forces import Forces
 
 
 def test_two_wrong_parameters_are_both_given():
@@ -14,10 +17,24 @@ def test_two_wrong_parameters_are_both_given():
     assert given.modulus_pa == 1.5 * MODULUS_PA and given.radius_m == 1.2 * RADIUS_M
 
 
-def test_pairs_of_a_simulators_flaws_are_two_of_its_single_ones():
+@pytest.fixture(scope="module")
+def parameters():
+    return Parameters(Block(0, LAYOUT))
+
+
+@pytest.mark.parametrize(("field", "side"), [("modulus_pa", 0), ("modulus_pa", 1), ("radius_m", 1)])
+def test_a_wrong_parameter_changes_the_force_by_the_drawn_multiple(parameters, field, side):
+    block = Block(0, LAYOUT)
+    law = block.force(Given(poisson=POISSON))
+    wrong = block.force(Given(**{"poisson": POISSON, field: parameters.wrong_by(field, side, 8.0)}))
+    change = np.sqrt(((wrong - law)[law.any(axis=1)] ** 2).sum(axis=1).mean())
+    assert change == pytest.approx(8 * parameters.visible_n, rel=0.1)
+
+
+def test_pairs_of_a_simulators_flaws_are_two_of_its_single_ones(parameters):
     """Else what each changes alone would have to be run for them again."""
     rng = np.random.default_rng(3)
-    plan = drawn_plan("drake", rng, 8, 5)
+    plan = drawn_plan("drake", rng, 8, 5, parameters)
     alone = [case[0] for case in plan if len(case) == 1]
     assert len(alone) == 8 and "contact stiffness" not in {flaw.name for flaw, _ in alone}  # it has none
     for pair in (case for case in plan if len(case) == 2):
@@ -36,3 +53,11 @@ def test_what_a_simulator_has_of_its_own_is_no_answer_to_what_was_planted():
     row |= {"right": {"damping": ["mesh_stiffness"]}}
     assert new_in(row)[0] == "mesh_stiffness"
     assert new_in({"sizes_n": {"time_step": 0.1}, "named": ["time_step"]}) == ["time_step"]
+
+
+@pytest.mark.slow
+def test_a_sensor_that_reads_late_gives_no_simulation_a_wrong_modulus():
+    block = Block(0, LAYOUT)
+    law = Forces(block.t, block.force(Given(poisson=POISSON)), "law")
+    verdict = _verdict(_world(block, True, 1), law, CONTROLS["scikit-fem"].stated)
+    assert "time_delay" in verdict.effects and not verdict.parts["parameters"].names

@@ -9,6 +9,7 @@ import pytest
 
 from diagnose.numerics.base import Signal, signal_of
 from diagnose.numerics.contact_stiffness import layer_factors
+from diagnose.numerics.lost_contact import lost
 from diagnose.numerics.registry import NAMES, numericals
 from diagnose.options import DiagnoseOptions
 from diagnose.other_simulator.advice import parameter_words
@@ -207,6 +208,17 @@ def test_flicker_and_falling_through_show_in_the_samples(world):
     _, seen = seen_in_samples(signal_of(presses, through))
     assert seen["tunnelling"][1]["share"] == pytest.approx(1 / len(presses))
     assert not seen_in_samples(signal_of(presses, at))[1]
+
+
+def test_a_short_press_whose_force_begins_late_has_lost_no_contact():
+    t = np.arange(0.0, 0.1, 0.002)
+    depth = 0.002 * np.clip(np.minimum(t, t[-1] - t) / 0.03, 0.0, 1.0)
+    push = 1e3 * np.maximum(depth - 0.001, 0.0) ** 1.5  # of a tip that is met a millimetre late
+    force = push[:, None] * [0.0, 0.0, 1.0]
+    signal = Signal(t, force, depth, np.tile([0.0, 0.0, 1.0], (len(t), 1)), (slice(0, len(t)),), t < 0)
+    assert not lost(signal)[0].any()
+    force[20:24] = 0.0
+    assert lost(signal)[0].nonzero()[0].tolist() == [20, 21, 22, 23]
 
 
 def passed_through(presses, force, which, *, turns):

@@ -8,10 +8,12 @@ import pytest
 from mechanics.errors import OptionError
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool
+from mechanics.progress import silent
 from mechanics.shape.box_mesh import box_mesh
 from render.options import RenderOptions
 from render.press import Stroke, press
 from render.registry import create, names, simulator_names
+from render.replay import replay
 from render.scene import in_the_air
 from render.simulators.base import SteppedWorld
 
@@ -71,6 +73,27 @@ def test_mujoco_pushes_back_and_a_harder_contact_more(model, tmp_path, monkeypat
     plain = pressed(model, "mujoco")
     hard = pressed(model, "mujoco", simulator_set="solref_s=0.004,timestep_s=0.001")
     assert plain.force_at(0.002)[2] > 0 and hard.peak_force_n > 1.2 * plain.peak_force_n
+
+
+@pytest.mark.parametrize(
+    ("name", "needs"),
+    [("scikit-fem", "skfem"), ("mujoco", "mujoco"), ("drake", "pydrake"), ("newton", "newton")],
+)
+def test_a_tip_that_goes_sideways_drags_the_surface_along(model, name, needs, tmp_path, monkeypatch):
+    """Near Mindlin's force, on a coarse mesh: to a tip that is put elsewhere without a velocity no friction
+    acts."""
+    pytest.importorskip(needs)
+    monkeypatch.chdir(tmp_path)
+    t = np.arange(0.0, 0.09, 0.002)
+    down, aside = np.interp(t, [0.0, 0.04], [-5e-4, 2e-3]), np.interp(t, [0.05, 0.08], [0.0, 5e-4])
+    tip = np.column_stack([aside, 0 * t, 0.024 + RADIUS - down])
+    settings = "edge_radii=inf" + ("" if name == "scikit-fem" else ",timestep_s=0.002")
+    options = RenderOptions(friction=1.0, simulator_settings="best", simulator_set=settings)
+    renderer = create(name, model, options)
+    force = replay(renderer, t, tip, progress=silent)
+    before = force[np.searchsorted(t, 0.049)]
+    mindlin = 4 * E / (1 + NU) * np.sqrt(RADIUS * 0.002) / (2 - NU) * 5e-4
+    assert -3 * mindlin < force[-1][0] - before[0] < -0.3 * mindlin
 
 
 @pytest.mark.parametrize(("name", "needs"), [("drake", "pydrake"), ("newton", "newton")])
