@@ -159,7 +159,8 @@ def _solve(body: Body, mesh: TetMesh, sites: TouchSites, fit: ModulusFit, progre
     body.say(f"--exact: {said_beforehand(places_to_solve, len(laws))}")
     return solve_touched(
         mesh, touched, laws, ratio=np.ones(len(mesh.tetrahedra)), poisson_ratio=body.poisson_ratio,
-        young_modulus_pa=fit.modulus_pa, tip_radius_m=presses.tip_radius_m, progress=progress,
+        young_modulus_pa=fit.modulus_pa, tip_radius_m=presses.tip_radius_m,
+        surface=(body.surface.vertices, body.surface.triangles), progress=progress,
     )  # fmt: skip
 
 

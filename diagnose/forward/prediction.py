@@ -26,6 +26,7 @@ from mechanics.press_solver.solved_places import ExactPresses, Touched, solve_to
 from mechanics.presses.table import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording.kinematics import acceleration
+from render.surface.felt_surface import felt_surface
 
 KEPT = 8
 """Integrated touches that are kept."""
@@ -183,9 +184,10 @@ def solved(forward: Forward, progress: Progress = silent) -> Forward:
     t, places, model = forward.touches, forward.places, forward.model
     far = np.einsum("pji,pjk,pkl->pil", places.frame, places.far, places.frame)
     known = TouchedPlaces(t.normal, far, places.curvature, places.bracing)
+    felt = felt_surface(model)
     exact = solve_touched(
         model.mesh, Touched(t.point, place_of(t), t.deepest, known), LAWS, ratio=model.element_ratio,
         poisson_ratio=model.material.poisson_ratio, young_modulus_pa=model.material.young_modulus_pa,
-        tip_radius_m=forward.tip_radius, progress=progress,
+        tip_radius_m=forward.tip_radius, surface=(felt.points, felt.triangles), progress=progress,
     )  # fmt: skip
     return Forward(t, places, exact=exact)

@@ -166,15 +166,18 @@ def solve_touched(
     poisson_ratio: float,
     young_modulus_pa: float,
     tip_radius_m: float,
+    surface: tuple[np.ndarray, np.ndarray] | None = None,
     progress: Progress = silent,
 ) -> ExactPresses:
     """Solve every touched place, as deep as it was pressed, under each of the dent's laws; the tip sticks.
 
-    ratio: (m,) modulus of each tetrahedron of `mesh` over the object's. Raises OptionError for a law that no
-    press is solved under.
+    ratio: (m,) modulus of each tetrahedron of `mesh` over the object's. surface: (vertices, triangles) that
+    is felt, where the mesh knows no shape of its own; None: its boundary, whose facets move single places by
+    3 %. Raises OptionError for a law that no press is solved under.
     """
     check_laws(laws)
-    linear, surface, deepest = mesh.linear(), felt_of(mesh), deepest_of_sites(touched.site, touched.deepest_m)
+    linear, deepest = mesh.linear(), deepest_of_sites(touched.site, touched.deepest_m)
+    surface = felt_of(mesh) if mesh.shape is not None or surface is None else surface
     count, clock = len(touched.site), PlacesLeft(len(deepest) * len(laws))
     told: dict[str, dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]] = {law: {} for law in laws}
     found: list[tuple[SolvedPlace, int]] = []
