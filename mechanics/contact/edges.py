@@ -25,7 +25,7 @@ TURN_POWER = 3
 """Power of a rim's turn, over a right angle, with which it counts: solved for 60 and 90 degrees."""
 _REACH, _STEP = 3.5, 0.5
 """Widths of a Gaussian beyond which it is left out (0.002); between its samples."""
-_ON_BASE = 0.12
+_ON_BASE = 0.2
 """Patch widths from the base within which a crease is the base's outline, no rim."""
 _AT_ONCE = 1000
 
