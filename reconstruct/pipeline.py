@@ -40,7 +40,7 @@ from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
 from reconstruct.steps.s5_mesh.meshing import Meshing, uncertainty_at
 from reconstruct.steps.s6_one_d.one_d import OneD, columns, profiles
-from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out, told_by_others
+from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 from reconstruct.steps.s7_modulus.modulus_field import with_fitted_field
 from reconstruct.steps.s7_modulus.modulus_paper import PaperFit
@@ -199,8 +199,8 @@ def _judged(
     sites, modulus = fitted.sites, fitted.modulus
     if sites is None or modulus is None:
         return model, None
-    presses, told = model.presses, told_by_others(modulus)
-    predicted = held_out(presses, sites, modulus, told)
+    presses, by_others = model.presses, modulus_by_others(modulus)
+    predicted = held_out(presses, sites, modulus, by_others)
     clock.lap("held-out places")
     if field == "auto" or (field == "where-beaten" and predicted is not None and predicted.beaten_by):
         model, of_field = with_fitted_field(model, sites, noise_n)

@@ -18,7 +18,8 @@ from pypardiso import PyPardisoSolver
 from mechanics.compliance.patch import half_space_compliance
 from mechanics.contact.dent import dent_law, effective_radius, grid
 from mechanics.disk.writing import atomic_file
-from tools.dent_table import COARSE, Grading, HalfSpace, Press, lagrange, rule
+from tools.dent_half_space import COARSE, Grading, HalfSpace, lagrange, rule
+from tools.dent_table import Press
 from tools.script import script
 
 PATCH_WIDTH = 0.8

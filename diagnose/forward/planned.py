@@ -41,8 +41,8 @@ def pressed(forward: Forward, plan: Plan) -> Presses:
     contact = np.flatnonzero(into > 0)
     centre = t.point + forward.tip_radius * t.normal
     position = (centre[:, None] - np.einsum("pij,ni->pnj", t.frame, local)).reshape(-1, 3)
-    told = [sides(clock, position[i * n : (i + 1) * n]) for i in range(p)]
-    lead, unsure = (np.concatenate(each) for each in zip(*told, strict=True))
+    each_way = [sides(clock, position[i * n : (i + 1) * n]) for i in range(p)]
+    lead, unsure = (np.concatenate(each) for each in zip(*each_way, strict=True))
     turned = None if t.quaternion is None else np.repeat(t.quaternion[t.starts[:-1]], n, axis=0)
     none = np.zeros_like(position)
     return dataclasses.replace(

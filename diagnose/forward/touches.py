@@ -47,8 +47,8 @@ def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
         raise DiagnosisError("the table of presses has no samples: reconstruct the recording again")
     if presses.quasi_static:
         return _enough(presses, np.diff(presses.starts) >= LEAST_POINTS, f"have {LEAST_POINTS} rows or more")
-    told = [sides(presses.t[part], presses.position[part]) for part in presses.parts]
-    lead, unsure = (np.concatenate(each) for each in zip(*told, strict=True))
+    each_way = [sides(presses.t[part], presses.position[part]) for part in presses.parts]
+    lead, unsure = (np.concatenate(each) for each in zip(*each_way, strict=True))
     limit = np.append(presses.onset_s[1:] - LEAD_S, np.inf)
     seen = dataclasses.replace(presses, columns={"lead": lead, "unsure": unsure})
     rows = (seen.t >= (seen.onset_s - LEAD_S)[seen.press]) & (

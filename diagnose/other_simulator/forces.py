@@ -120,12 +120,11 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions) -> Aligned:
         notes.append(
             f"rows come at {1 / step:.4g} Hz, the recording's at {1 / own:.4g} Hz: straight lines between"
         )
-    usable = _without_gaps(t, presses, step)
-    if given.chosen is not None:
-        return Aligned(at, usable & given.chosen, tuple(notes))
-    if not usable.all():
+    run = np.ones(len(presses), dtype=bool) if given.chosen is None else given.chosen
+    usable = run & _without_gaps(t, presses, step)
+    if not usable[run].all():
         notes.append(
-            f"{(~usable).sum()} of {len(usable)} presses were left out: rows are missing for over "
+            f"{(run & ~usable).sum()} of {run.sum()} presses were left out: rows are missing for over "
             f"{1e3 * LONGEST_GAP_S:g} ms"
         )
     return Aligned(at, usable, tuple(notes))

@@ -1,4 +1,4 @@
-"""Which presses a dear simulator is run over."""
+"""Which presses a slow simulator is run over."""
 
 from __future__ import annotations
 

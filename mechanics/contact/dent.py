@@ -48,8 +48,10 @@ class DentLaw:
     ) -> np.ndarray:
         """Force on the object along -n, N, for indentations (k,) m of a half-space (0 where not positive)."""
         plane_strain = young_modulus_pa / (1 - poisson_ratio**2)
-        depth = np.atleast_1d(np.asarray(depth_m, dtype=float))
-        return np.array([dent_force(self.table, d, tip_radius_m, 0.0, plane_strain)[0] for d in depth])
+        depth = np.array(depth_m, dtype=float, ndmin=1, order="C")  # one kind for the kernel
+        force = np.empty(len(depth))
+        _dent_forces(self.table, depth, float(tip_radius_m), float(plane_strain), force)
+        return force
 
     def scaled(self, c: np.ndarray | float, tau: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
         """The law with c and tau multiplied by factors, one or one a row of `grid()`."""
@@ -162,6 +164,13 @@ def dent_force(table, depth, radius, bend, plane_strain_modulus):
     force = plane_strain_modulus * radius * radius * c * x * root
     stiffness = plane_strain_modulus * radius * (1.5 * c * root + slope * x * root)
     return force, stiffness, radius * tau * root
+
+
+@kernel
+def _dent_forces(table, depth, radius, plane_strain_modulus, force):
+    """`dent_force` of indentations (k,) of a plane, into force (k,) N."""
+    for i in range(len(depth)):
+        force[i], _, _ = dent_force(table, depth[i], radius, 0.0, plane_strain_modulus)
 
 
 def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> float | np.ndarray:

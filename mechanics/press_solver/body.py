@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.press_solver.condensing import Assembly, partial_factor
+from mechanics.elastic.partial_factor import partial_factor
+from mechanics.press_solver.condensing import Assembly
 from mechanics.press_solver.graded_mesh import GradedMesh
 from mechanics.press_solver.solid import Response, Solid
 

@@ -33,7 +33,7 @@ from render.surface.snapping import surface_uncertainty, touched_surface
 
 FILE = "surface.vtp"
 OWN_DEPTH_M = 1e-3
-"""Depth of the press by which a place's own stiffness is told."""
+"""Depth of the press by which a place's own stiffness is stated."""
 PRESSES, TOUCHES = "presses", "touch sites"
 _STEPS = 7
 _PLACES = 2500
@@ -78,12 +78,12 @@ def _from_touches(model: Model, surface: FeltSurface, sites: TouchSites) -> np.n
     Radial basis functions as for the 1D renderers' parameters (linear kernel), within the sites' range.
     """
     far = np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)
-    told = np.column_stack([far, sites.curvature])
+    at_sites = np.column_stack([far, sites.curvature])
     scale = np.linalg.norm(np.ptp(surface.points, axis=0))
-    spread = told[[0] * len(surface.points)]
+    spread = at_sites[[0] * len(surface.points)]
     if len(sites) > 1:
-        smooth = RBFInterpolator(sites.points / scale, told, kernel="linear", degree=0, smoothing=1e-3)
-        spread = np.clip(smooth(surface.points / scale), told.min(axis=0), told.max(axis=0))
+        smooth = RBFInterpolator(sites.points / scale, at_sites, kernel="linear", degree=0, smoothing=1e-3)
+        spread = np.clip(smooth(surface.points / scale), at_sites.min(axis=0), at_sites.max(axis=0))
     depths = np.linspace(0.0, OWN_DEPTH_M, _STEPS)
     up = np.array([0.0, 0.0, 1.0])
     forces = touch_forces(

@@ -73,8 +73,8 @@ def surface_uncertainty(model: Model, surface: ContactSurface) -> np.ndarray:
     covariance += ONSET_NOISE_M**2 * np.eye(len(gaps))
     touched = np.unique(arrays.triangles[arrays.free > 0])
     shared = at_feet * _kernel(arrays.vertices[touched], arrays.normals[touched], feet, normals)
-    told = np.einsum("vk,kv->v", shared, np.linalg.solve(covariance, shared.T))
-    sd[touched] *= np.sqrt(np.clip(1 - told, 0.0, 1.0))
+    explained = np.einsum("vk,kv->v", shared, np.linalg.solve(covariance, shared.T))
+    sd[touched] *= np.sqrt(np.clip(1 - explained, 0.0, 1.0))
     return sd
 
 

@@ -10,29 +10,29 @@ class Assembly:
     """Where every element entry goes in the upper triangle of the free stiffness, found once.
 
     cells: (m, 10) node numbers. free: (3 n,) bool. springs: (3 n,) support stiffness on the diagonal, or
-    None.
+    None. pattern: that triangle, CSR, sorted.
     """
 
     def __init__(self, cells: np.ndarray, free: np.ndarray, springs: np.ndarray | None = None) -> None:
         self.free, self.springs = free, springs
         self.dofs = (3 * cells[:, :, None] + np.arange(3)).reshape(len(cells), 30)
         number = np.full(free.size, -1)
-        self._size = n = int(free.sum())
+        n = int(free.sum())
         number[free] = np.arange(n)
         row = np.repeat(number[self.dofs], 30, axis=1)
         column = np.tile(number[self.dofs], (1, 30))
         self._use = (row >= 0) & (column >= row)
         keys = np.concatenate([(row * np.int64(n) + column)[self._use], np.arange(n) * np.int64(n + 1)])
         unique, self._into = np.unique(keys, return_inverse=True)
-        self._indptr = np.searchsorted(unique // n, np.arange(n + 1)).astype(np.int32)
-        self._indices = (unique % n).astype(np.int32)
+        indptr = np.searchsorted(unique // n, np.arange(n + 1)).astype(np.int32)
+        indices = (unique % n).astype(np.int32)
+        self.pattern = sp.csr_matrix((np.zeros(len(unique)), indices, indptr), shape=(n, n))
 
-    def stiffness(self, elements: np.ndarray) -> sp.csr_matrix:
-        """Upper triangle (CSR, sorted) from element stiffness (m, 30, 30), springs with it."""
-        diagonal = np.zeros(self._size) if self.springs is None else self.springs[self.free]
+    def stiffness(self, elements: np.ndarray) -> np.ndarray:
+        """(nnz,) values of `pattern` from element stiffness (m, 30, 30), springs with them."""
+        diagonal = np.zeros(self.pattern.shape[0]) if self.springs is None else self.springs[self.free]
         values = np.concatenate([elements.reshape(len(elements), -1)[self._use], diagonal])
-        data = np.bincount(self._into, values, minlength=len(self._indices))
-        return sp.csr_matrix((data, self._indices, self._indptr), shape=(self._size, self._size))
+        return np.bincount(self._into, values, minlength=self.pattern.nnz)
 
     def residual(self, elements: np.ndarray, displacement: np.ndarray) -> np.ndarray:
         """(free,) resisting forces from those of the elements (m, 30), springs with them."""

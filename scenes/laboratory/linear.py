@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.elastic.partial_factor import partial_factor
 from scenes.laboratory.assembly import Assembly
-from scenes.laboratory.condensation import Condensation
 from scenes.laboratory.contact import Grip, SphereContact
 from scenes.laboratory.solid import Solid
 from scenes.laboratory.solver import LabError
@@ -48,10 +48,9 @@ class LinearProblem:
         mesh = solid.mesh
         _, stiffness, _, _ = solid.evaluate(np.zeros_like(mesh.points), solid.new_history(), 0.0, True)
         self._touching = Touching(contact, free, floor)
-        factor = Condensation(self._touching.kept)
-        self._compliance = np.linalg.inv(
-            factor.refresh(Assembly(mesh.cells, free, springs).stiffness(stiffness))
-        )
+        assembly = Assembly(mesh.cells, free, springs)
+        factor = partial_factor(assembly.pattern, np.flatnonzero(self._touching.kept))
+        self._compliance = np.linalg.inv(factor.refresh(assembly.stiffness(stiffness)))
         self._prony = solid.material.prony
 
     def rest(self, centre: np.ndarray) -> LinearState:

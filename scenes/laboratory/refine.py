@@ -13,7 +13,10 @@ _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 def boundary_faces(tetrahedra: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(faces (k, 3) outward, their tetrahedra (k,)): faces that belong to one tetrahedron only."""
     faces = tetrahedra[:, _FACES].reshape(-1, 3)
-    _, index, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    # one number a face, of at most 2 million nodes: whole rows are compared byte by byte, ten times as slow
+    a, b, c = np.sort(faces.astype(np.int64), axis=1).T
+    nodes = np.int64(tetrahedra.max()) + 1
+    _, index, count = np.unique((a * nodes + b) * nodes + c, return_index=True, return_counts=True)
     single = index[count == 1]
     return faces[single], single // 4
 

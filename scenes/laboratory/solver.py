@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mechanics.elastic.partial_factor import partial_factor
 from mechanics.errors import PalpateError
 from scenes.laboratory.assembly import Assembly
-from scenes.laboratory.condensation import Condensation
 from scenes.laboratory.contact import Grip, SphereContact
 from scenes.laboratory.solid import History, Solid
 from scenes.laboratory.touching import Touching
@@ -75,7 +75,7 @@ class Problem:
     def __post_init__(self) -> None:
         self._assembly = Assembly(self.solid.mesh.cells, self.free, self.springs)
         self._touching = Touching(self.contact, self.free, self.floor)
-        self._factor = Condensation(self._touching.kept)
+        self._factor = partial_factor(self._assembly.pattern, np.flatnonzero(self._touching.kept))
         self._compliance: np.ndarray | None = None
         self._kept = np.flatnonzero(self.free)[self._touching.kept]
 

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 import mechanics.compliance.surface_compliance as made
-from diagnose.apply import improved, with_effects, with_replayed_modulus
-from diagnose.options import DiagnoseOptions
-from diagnose.pipeline import diagnose
+from diagnose.apply import with_effects, with_replayed_modulus
 from mechanics.compliance.near_field import surface_softness
 from mechanics.compliance.sites import touch_solver
 from mechanics.effects.registry import effect
@@ -180,30 +178,6 @@ def test_only_what_belongs_into_a_model_is_put_there(model):
     assert with_effects(better, {"adhesion": {"pull_off_n": 0.1, "range_m": 1e-3}}).effects.keys() == {
         "friction_slip", "adhesion",
     }  # fmt: skip
-
-
-def test_the_improved_model_is_what_was_fitted(bench, tmp_path):
-    g, tau = 0.3, 0.3
-
-    def alter(t, x, f):
-        out, branch, last = f.copy(), np.zeros(3), f[0]
-        step = np.diff(t, prepend=t[0] - 0.002)
-        for i in range(len(t)):
-            decay = np.exp(-step[i] / tau)
-            branch = decay * branch + tau / step[i] * (1 - decay) * (f[i] - last)
-            last, out[i] = f[i], f[i] + g * branch
-        return x, out
-
-    recording, plain = bench.record(alter)
-    result = diagnose(recording, plain, DiagnoseOptions(fast=True))
-    better, kept = improved(plain, result)
-    again = read_model(write_model(tmp_path / "model", better))
-    assert "viscoelasticity" in kept
-    assert sum(again.effects["viscoelasticity"]["g"]) == pytest.approx(g, rel=0.15)
-    assert again.material.young_modulus_pa == pytest.approx(20e3, rel=0.05)
-    fitted = "finite_strain" in result.attribution.final.found.names
-    assert again.material.dent_law == ("neo-hookean" if fitted else "linear")
-    assert fitted  # as the presses were made
 
 
 def test_softness_of_the_surface_leaves_balls_out(model):

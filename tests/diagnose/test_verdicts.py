@@ -17,6 +17,7 @@ from diagnose.options import DiagnoseOptions, NuisanceOptions
 from diagnose.pipeline import diagnose
 from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.next_touch import next_touch
+from mechanics.model.files import read_model, write_model
 from mechanics.presses.gap_bins import gap_by_bin
 from palpate.show.demo import diagnosis_json, diagnosis_words
 from palpate.show.diagnosis.words import spoken, verdict
@@ -30,16 +31,15 @@ def _late(t, x, f):
 
 
 def _relaxing(t, x, f):
-    """A Zener force, integrated by small implicit steps of its own (not the recursion under test)."""
-    memory = np.zeros(3)
-    out = np.empty_like(f)
-    dt = t[1] - t[0]
+    """A Zener force, its branch solved exactly between samples (not the recursion under test)."""
+    g, tau = 0.3, 0.3
+    out, branch, last = f.copy(), np.zeros(3), f[0]
+    step = np.diff(t, prepend=t[0] - 0.002)
     for i in range(len(t)):
-        change = f[i] - f[i - 1] if i else np.zeros(3)
-        memory = (memory + change) / (1 + dt / 0.3)
-        out[i] = f[i] + 0.4 * memory
-    # a surface that comes back late lets go of the tip: it never pulls
-    return x, np.where((out * f).sum(axis=1, keepdims=True) > 0, out, 0.0)
+        decay = np.exp(-step[i] / tau)
+        branch = decay * branch + tau / step[i] * (1 - decay) * (f[i] - last)
+        last, out[i] = f[i], f[i] + g * branch
+    return x, out
 
 
 @pytest.fixture(scope="module")
@@ -75,13 +75,17 @@ def test_delay_is_named_measured_and_taken_off(delayed):
     assert "time_delay" not in again.effects
 
 
-def test_memory_is_named_and_goes_into_the_model(bench):
+def test_memory_is_named_and_goes_into_the_model(bench, tmp_path):
     recording, model = bench.record(_relaxing)
     result = diagnose(recording, model, FAST)
     assert result.effects[0] == "viscoelasticity"
     better, kept = improved(model, result)
     assert kept == ["viscoelasticity"]
-    assert sum(better.effects["viscoelasticity"]["g"]) == pytest.approx(0.4, rel=0.25)
+    again = read_model(write_model(tmp_path / "model", better))
+    assert sum(again.effects["viscoelasticity"]["g"]) == pytest.approx(0.3, rel=0.15)
+    assert again.material.young_modulus_pa == pytest.approx(20e3, rel=0.05)
+    assert "finite_strain" in result.attribution.final.found.names  # as the presses were made
+    assert again.material.dent_law == "neo-hookean"
 
 
 def test_bias_is_settled_in_free_air(bench):
@@ -242,7 +246,9 @@ def test_what_makes_the_held_out_gap_grow_is_a_candidate_and_never_named(bench, 
     assert any("grows" in reason for reason in result.reasons)
 
 
-def test_the_page_says_what_to_do_and_its_view_switches_effects_on(delayed, tmp_path):
+def test_the_page_says_what_to_do_and_its_view_switches_effects_on(
+    delayed, tmp_path, no_pictures, nothing_to_press
+):
     recording, model, result = delayed
     text = result.report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "What to do next: take time delay off the readings" in text
@@ -270,7 +276,7 @@ def test_bars_are_few_and_are_the_gaps_without_and_with_what_was_found(delayed):
     assert ax.lines[0].get_xdata()[0] == pytest.approx(1e3 * result.noise_n)
 
 
-def test_what_the_model_already_has_is_not_proposed_again(delayed, tmp_path, no_pictures):
+def test_what_the_model_already_has_is_not_proposed_again(delayed, tmp_path, no_pictures, nothing_to_press):
     """The verdict, the terminal and the page agree; JSON still names every effect."""
     recording, model, found = delayed
     both = dataclasses.replace(found, effects=("time_delay", "finite_strain"), kind="effect")

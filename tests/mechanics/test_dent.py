@@ -96,7 +96,8 @@ def test_curvature_shrinks_or_widens_the_sphere():
 def test_axisymmetric_solution_meets_punches_and_the_tables():
     """The tables' own solver, coarse: flat punches in closed form, then one short press of each law."""
     pytest.importorskip("pypardiso")
-    from tools.dent_table import HalfSpace, press_curve
+    from tools.dent_half_space import HalfSpace
+    from tools.dent_table import press_curve
 
     body = HalfSpace(0.08, NU, "linear", 0.4)
     stuck = body.top[:11]

@@ -5,7 +5,6 @@ import pytest
 
 from mechanics.contact.dent import dent_law
 from mechanics.errors import OptionError
-from mechanics.press_solver.condensing import SuperLuFactor, partial_factor
 from mechanics.press_solver.curved_faces import FeltSurface
 from mechanics.press_solver.even_surface import even_surface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
@@ -140,22 +139,6 @@ def off_box(points: np.ndarray, half: np.ndarray) -> np.ndarray:
     """(k,) m, signed distance of points (k, 3) from a box of half sizes (3,) m about the origin."""
     out = np.abs(points) - half
     return np.linalg.norm(np.maximum(out, 0), axis=1) + np.minimum(out.max(axis=1), 0)
-
-
-def test_both_factorisations_condense_alike():
-    import scipy.sparse as sp
-
-    rng = np.random.default_rng(0)
-    full = sp.random(60, 60, 0.1, random_state=0)
-    full = full @ full.T + 2 * sp.eye(60)
-    upper, kept = sp.triu(full, format="csr"), np.array([3, 20, 41])
-    upper.sort_indices()
-    load, change = rng.normal(size=60), rng.normal(size=3)
-    factors = [kind(upper, kept) for kind in (partial_factor, SuperLuFactor)]
-    schur = [f.refresh(upper.data) for f in factors]
-    np.testing.assert_allclose(schur[0], np.linalg.inv(np.linalg.inv(full.toarray())[np.ix_(kept, kept)]))
-    np.testing.assert_allclose(*schur)
-    np.testing.assert_allclose(*(f.backward(f.forward(load), change) for f in factors))
 
 
 def test_a_shallow_press_without_friction_is_hertz():

@@ -49,7 +49,8 @@ def test_the_dent_lies_a_little_above_that_of_yeohs_law():
 @pytest.mark.slow
 def test_a_ratio_between_those_of_the_table_is_solved_anew():
     pytest.importorskip("pypardiso")
-    from tools.dent_table import COARSE, press_curve
+    from tools.dent_half_space import COARSE
+    from tools.dent_table import press_curve
 
     ratio = -0.3
     curves = [press_curve("neo-hookean", 0.49, 0.15, 0.5, stiffening=r, grading=COARSE) for r in (0.0, ratio)]

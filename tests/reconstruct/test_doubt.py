@@ -16,7 +16,7 @@ from reconstruct.geometry.in_device_frame import nowhere
 from reconstruct.geometry.known_shape import place
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.steps.s3_contacts.contacts import explore
-from reconstruct.steps.s7_modulus.held_out import held_out, told_by_others
+from reconstruct.steps.s7_modulus.held_out import held_out, modulus_by_others
 from reconstruct.steps.s7_modulus.modulus import fit_modulus
 
 from .exploration_of_cylinder import HEIGHT, RADIUS, explore_cylinder
@@ -65,7 +65,7 @@ def test_a_modulus_is_weighed_against_a_constant_push(depth_matters):
         found = dataclasses.replace(found, force=push[:, None] * found.normal[found.press])
     sites = _half_space(found)
     fit = fit_modulus(found, sites, NOISE_N)
-    told = held_out(found, sites, fit, told_by_others(fit))
+    told = held_out(found, sites, fit, modulus_by_others(fit))
     assert told is not None
     assert (told.doubt == "") == depth_matters
     if depth_matters:

@@ -12,7 +12,7 @@ from mechanics.model.one_d_laws import RIVALS
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.methods import ReconstructOptions
 from reconstruct.pipeline import reconstruct_fully
-from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out, told_by_others
+from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
 from reconstruct.steps.s7_modulus.modulus_field import FieldOptions
 
 from .flat_contact import points
@@ -35,7 +35,7 @@ def varied(factorised_once):
 
 
 def of_one_modulus(made) -> HeldOut:
-    told = held_out(made.model.presses, made.sites, made.modulus, told_by_others(made.modulus))
+    told = held_out(made.model.presses, made.sites, made.modulus, modulus_by_others(made.modulus))
     assert told is not None
     return told
 

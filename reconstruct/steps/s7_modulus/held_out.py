@@ -53,8 +53,8 @@ class HeldOut:
         return self.floor if self.behind > 1 and self.floor_n < BETTER * self.model_n else ""
 
 
-def told_by_others(fit: ModulusFit) -> np.ndarray | None:
-    """(p,) Pa, the modulus that the presses of other places tell each press; None where any is told none."""
+def modulus_by_others(fit: ModulusFit) -> np.ndarray | None:
+    """(p,) Pa, the modulus of each press by the presses of other places; None where any has none."""
     modulus = np.full(len(fit.site), np.nan)
     for place in np.unique(fit.site):
         seen = fit.site != place
@@ -66,25 +66,25 @@ def told_by_others(fit: ModulusFit) -> np.ndarray | None:
 
 
 def held_out(
-    presses: Presses, sites: TouchSites, fit: ModulusFit, told_pa: np.ndarray | None
+    presses: Presses, sites: TouchSites, fit: ModulusFit, by_others_pa: np.ndarray | None
 ) -> HeldOut | None:
     """Presses that touch at `sites` (one a press, in order), each place predicted by all the others; None
     where there is one place alone or nothing to predict. First touches that were not recorded are where the
     fit has them, for every model alike.
 
-    told_pa: (p,), as if the object were of one modulus, told by other places.
+    by_others_pa: (p,), by `modulus_by_others`, as if the object were of one modulus.
     """
     presses = touched_as_fitted(presses, fit.press)
     smooth = low_passed(presses)
     data = replace(smooth, force=presses.net.force).window(0.0, 0.0).thinned(_BLOCK_S)
-    if told_pa is None or len(np.unique(presses.site)) < 2 or not len(data.press):
+    if by_others_pa is None or len(np.unique(presses.site)) < 2 or not len(data.press):
         return None
-    fits = columns(fit_robust(smooth.window(0.0, 0.0), presses.noise.raw_n), told_pa)
+    fits = columns(fit_robust(smooth.window(0.0, 0.0), presses.noise.raw_n), by_others_pa)
     unit = forces_at(
         sites, data.displacement, data.starts, young_modulus_pa=1.0, tip_radius_m=presses.tip_radius_m,
         law=fit.press.law,
     )  # fmt: skip
-    missed = _squares(told_pa[data.press, None] * unit, data)
+    missed = _squares(by_others_pa[data.press, None] * unit, data)
     floors = {name: square for name in RIVALS if (square := _of_one_d(name, fits, data)) is not None}
     constant = _rms(_squares(_constant(data), data))
     if not floors:
@@ -108,15 +108,15 @@ def _constant(data: Presses) -> np.ndarray:
 def _of_one_d(name: str, fits: Fits, data: Presses) -> np.ndarray | None:
     """(n,) N^2 that a 1D model errs by, spread to each place from the others; None where they tell none."""
     own = LAWS[name](fits)
-    told = np.full((4, len(data)), np.nan)
+    spread = np.full((4, len(data)), np.nan)
     try:
         for place in np.unique(data.site):
             seen, here = data.site != place, data.site == place
             law = Law(*(column[seen] for column in own))
-            told[:, here] = spread_law(data.point[seen], data.site[seen], law, data.point[here])
+            spread[:, here] = spread_law(data.point[seen], data.site[seen], law, data.point[here])
     except ModelError:
         return None
-    return _squares(forces_of(Law(*told), data), data)
+    return _squares(forces_of(Law(*spread), data), data)
 
 
 def _squares(force: np.ndarray, data: Presses) -> np.ndarray:

@@ -201,17 +201,17 @@ class FieldOptions:
     )
 
 
-def told_by_field(own: PressModuli, found: Estimate) -> np.ndarray:
+def modulus_by_field(own: PressModuli, found: Estimate) -> np.ndarray:
     """(p,) Pa, each press's modulus, as if the object were of one, as the presses of other sites tell it."""
     log_modulus = found.level + own.shares.weight @ found.field.at(own.shares.nodes)
     number = np.clip(np.searchsorted(found.site, own.site), 0, len(found.site) - 1)
-    told = np.where(found.site[number] == own.site, found.foretold[number], log_modulus)
-    return np.exp(told)
+    log_modulus = np.where(found.site[number] == own.site, found.foretold[number], log_modulus)
+    return np.exp(log_modulus)
 
 
 def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> tuple[Model, np.ndarray | None]:
     """The model with the field that its presses, which touch at `sites`, ask for by its dent law, and what
-    `told_by_field` says of them; itself and None where they ask for none. noise_n: N, of a raw component.
+    `modulus_by_field` says of them; itself and None where they ask for none. noise_n: N, of a raw component.
 
     The modulus becomes that of the field's own level, with its 95 % interval.
     """
@@ -227,4 +227,4 @@ def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> tuple[
         young_modulus_pa=modulus, young_modulus_ci95_pa=(modulus / share, modulus * share)
     )
     there = stiffness_field.EFFECT.applied(levelled, stiffness_field.keys_of(found.field))
-    return there, told_by_field(own, found)
+    return there, modulus_by_field(own, found)

@@ -43,8 +43,14 @@ def material(given: list[Curve]):
     return material_of(tests, [c.name for c in given], fast=True)
 
 
-@pytest.mark.parametrize("modulus", [2e4, 1e6])
-@pytest.mark.parametrize("share", [0.2, 0.5])
+@pytest.mark.parametrize(
+    ("modulus", "share"),
+    [
+        (1e6, 0.2),
+        (2e4, 0.5),
+        *(pytest.param(*pair, marks=pytest.mark.slow) for pair in ((2e4, 0.2), (1e6, 0.5))),
+    ],
+)
 def test_a_machine_that_yields_is_told_with_its_stiffness(modulus, share):
     made = material(curves(modulus, stiffness_for(modulus, share)))
     assert made.effects == ("tool_compliance",)

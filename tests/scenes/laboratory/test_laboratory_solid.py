@@ -6,11 +6,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from scipy.integrate import trapezoid
 
 from mechanics.contact.dent import dent_law
-from scenes.laboratory.condensation import Condensation
 from scenes.laboratory.contact import SphereContact
 from scenes.laboratory.effects.contact import relaxed
 from scenes.laboratory.linear import LinearProblem
@@ -101,35 +99,6 @@ def test_rotation_costs_nothing() -> None:
     force, _, energy, _ = solid.evaluate(u, solid.new_history(), 0.0, False)
     assert abs(energy) < 1e-10
     assert np.abs(force).max() < 1e-10
-
-
-@pytest.mark.parametrize("smallest", [1.0, -1.0])
-def test_condensation_solves_definite_and_indefinite_matrices_in_turn(smallest: float) -> None:
-    rng = np.random.default_rng(2)
-    turn = np.linalg.qr(rng.normal(size=(40, 40)))[0]
-    kept = rng.random(40) < 0.2
-    factor, b = Condensation(kept), rng.normal(size=40)
-    for low in (1.0, smallest, 1.0):
-        matrix = turn @ np.diag(np.concatenate([[low], np.linspace(2, 9, 39)])) @ turn.T
-        schur = factor.refresh(sp.csr_matrix(np.triu(matrix)))
-        assert np.linalg.inv(schur) == pytest.approx(np.linalg.inv(matrix)[np.ix_(kept, kept)], abs=1e-9)
-        half = factor.forward(b)
-        x = factor.backward(half, np.linalg.solve(schur, half[kept]))
-        assert matrix @ x == pytest.approx(b, abs=1e-9)
-
-
-def test_condensation_is_the_same_without_pardiso(monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = np.random.default_rng(3)
-    matrix = (lambda a: a @ a.T + np.eye(30))(rng.normal(size=(30, 30)))
-    kept, b, found = rng.random(30) < 0.3, rng.normal(size=30), []
-    for there in (True, False):
-        if not there:
-            monkeypatch.setattr("scenes.laboratory.condensation.PyPardisoSolver", None)
-        factor = Condensation(kept)
-        schur, half = factor.refresh(sp.csr_matrix(np.triu(matrix))), factor.forward(b)
-        found.append((schur, half[kept], factor.backward(half, half[kept])))
-    for one, other in zip(*found, strict=True):
-        assert one == pytest.approx(other, abs=1e-9)
 
 
 def test_mixing_finds_a_fixed_point_that_plain_iteration_flees() -> None:
