@@ -192,7 +192,9 @@ def report(rows: list[dict[str, Any]]) -> dict[str, Any]:
     for row in rows:
         one = row["place"]
         row["error"] = row["force_m2"] / row["truth"]["press-solver"] - 1
-        row["stated"] = np.broadcast_to(law_share(one.depths / TIP_M, *row["numbers"]), row["error"].shape)
+        mu = np.inf if one.friction is None else one.friction
+        stated = law_share(one.depths / TIP_M, *row["numbers"], poisson_ratio=one.poisson_ratio, friction=mu)
+        row["stated"] = np.broadcast_to(stated, row["error"].shape)
     groups = {kind: [r for r in rows if r["place"].kind == kind] for kind in KINDS}
     groups |= {
         "sticking or friction over 0.4": [r for r in rows if (r["place"].friction or 1) > 0.4],
