@@ -119,9 +119,9 @@ def forces(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray
     return result
 
 
-def own_compliance_near(mesh: TetMesh, points: np.ndarray) -> SurfaceCompliance:
+def own_compliance_near(mesh: TetMesh, points: np.ndarray, nu: float = NU) -> SurfaceCompliance:
     """What `surface_compliance` makes, of places near the points alone, and nothing between places."""
-    fine = touch_solver(mesh, NU)
+    fine = touch_solver(mesh, nu)
     width = patch_width(fine.mesh)
     nodes, triangles = _corners(fine.mesh)
     corners = fine.mesh.points[nodes]
@@ -135,7 +135,7 @@ def own_compliance_near(mesh: TetMesh, points: np.ndarray) -> SurfaceCompliance:
         normals=vertex_normals(linear.points, linear.surface)[coarse], triangles=faces,
         blocks=np.zeros((0, 0, 3, 3), dtype=np.float32), patch_width_m=np.array([width]),
         factor=np.zeros((len(coarse), 3, 1), dtype=np.float32), own_points=corners, own_normals=facing,
-        own_triangles=triangles, own=own, own_width_m=np.array([width]), poisson_ratio=np.array([NU]),
+        own_triangles=triangles, own=own, own_width_m=np.array([width]), poisson_ratio=np.array([nu]),
     )  # fmt: skip
 
 

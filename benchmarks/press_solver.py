@@ -26,7 +26,7 @@ RADIUS_M, POISSON_RATIO = 5e-3, 0.49
 DEEPEST_MM = 8.0
 FINER: Mapping[str, PressOptions] = {
     "a finer mesh": PressOptions(growth=0.5, finest=0.3),
-    "a larger zone": PressOptions(zone=5.0),
+    "a larger zone": PressOptions(zone=9.0),
     "shorter steps": PressOptions(step=0.1),
     "a stiffer contact": PressOptions(penalty=4500.0),
 }

@@ -35,8 +35,6 @@ FROM_RIM_M = 1e-3 * np.array([1.5, 2.5, 3.5, 5.0, 8.0])
 FROM_BASE_M = 1e-3 * np.array([6.5, 8.5, 11.0, 15.0])
 DEEPEST_OF_LAYER = 0.6
 STEPS = 61
-ZONE = 6.0
-"""Of finite strain, contact radii: 3.5 are 1.1 % too soft 8 mm deep (mechanics.press_solver)."""
 
 
 @dataclass(frozen=True)
@@ -98,12 +96,15 @@ class Pressed:
     far: np.ndarray
     laid: np.ndarray
 
-    def by_law(self, amounts: np.ndarray, bracing: np.ndarray) -> np.ndarray:
+    def by_law(self, amounts: np.ndarray, bracing: np.ndarray, curvature: np.ndarray) -> np.ndarray:
         """(d,) m^2: the touch law's with these amounts (g,)."""
         way = np.unique(np.concatenate([np.linspace(0.0, self.depths[-1], STEPS), self.depths]))
         along = np.outer(self.normal, self.normal)
         place = TouchedPlaces(
-            self.normal[None], (self.far + self.laid @ amounts * along)[None], 0.0, self.laid @ bracing
+            self.normal[None],
+            (self.far + self.laid @ amounts * along)[None],
+            self.laid @ curvature,
+            self.laid @ bracing,
         )
         force = touch_forces(
             -way[:, None] * self.normal, np.array([0, len(way)]), place,
@@ -119,7 +120,7 @@ def pressed(mesh: TetMesh, points: np.ndarray, normals: np.ndarray, depths: np.n
     sites = touch_sites(mesh, points, normals, NU, solver=solver, curvature=0.0, patch=patch)
     truth = PressSolver(
         mesh.linear(), None, young_modulus_pa=1.0, poisson_ratio=NU, tip_radius_m=RADIUS_M,
-        options=PressOptions(coupled=True, zone=ZONE),
+        options=PressOptions(coupled=True),
     )  # fmt: skip
     near, found = laid(mesh, points, normals) / width, []
     for k, (point, normal) in enumerate(zip(points, normals, strict=True)):
@@ -129,16 +130,17 @@ def pressed(mesh: TetMesh, points: np.ndarray, normals: np.ndarray, depths: np.n
     return found
 
 
-def fit(found: list[Pressed]) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """(g,) compliances and bracing, and rms of what is left of the force without and with them. What places
-    far from any edge lack at a depth is no matter of edges: a constant a depth is fitted beside."""
+def fit(found: list[Pressed]) -> tuple[np.ndarray, float, float]:
+    """(3, g) compliances, bracing and curvature, and rms of what is left of the force without and with them.
+    What places far from any edge lack at a depth is no matter of edges: a constant a depth is fitted beside.
+    The Gaussian that has a curvature is of places on the rim itself, which no press here is, and stays."""
     given = np.stack(fitted()[2:])
-    free = given != 0
+    free = (given != 0) & (given[2] == 0)
     column = np.concatenate([np.searchsorted(DEPTHS_M, one.depths) for one in found])
     known = np.isfinite(np.concatenate([one.force for one in found]))
 
     def left(numbers: np.ndarray) -> np.ndarray:
-        amounts = np.zeros_like(given)
+        amounts = np.where(given[2] != 0, given, 0.0)
         amounts[free] = numbers[: free.sum()]
         off = np.concatenate([np.log(one.by_law(*amounts) / one.force) for one in found])
         return (off - numbers[free.sum() :][column])[known]
@@ -149,7 +151,7 @@ def fit(found: list[Pressed]) -> tuple[np.ndarray, np.ndarray, float, float]:
     solved = least_squares(left, start, x_scale="jac")
     given[free] = solved.x[: free.sum()]
     before, after = (float(np.sqrt((part**2).mean())) for part in (plain, solved.fun))
-    return given[0], given[1], before, after
+    return given, before, after
 
 
 def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
@@ -162,10 +164,10 @@ def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
         mesh = box_mesh((8, 8, max(1, round(height / 5e-3))), (LENGTH_M, WIDTH_M, height))
         depths = DEPTHS_M[DEPTHS_M < DEEPEST_OF_LAYER * height]
         found += pressed(mesh, np.array([[0.003, 0.004, height]]), np.array([[0, 0, 1.0]]), depths)
-    amounts, bracing, before, after = fit(found)
+    amounts, before, after = fit(found)
     widths, over_base, *_ = fitted()
     print(
-        f"amounts {np.round(amounts, 4)}, bracing {np.round(bracing, 4)}; {100 * before:.1f} % of the force "
+        f"compliance, bracing, curvature {np.round(amounts, 4).tolist()}; {100 * before:.1f} % of the force "
         f"without, {100 * after:.1f} % with"
     )
     if arguments.output:
@@ -173,12 +175,12 @@ def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
             f"prisms with rims of {arguments.angles} degrees and flanks above the base, layers of "
             f"{arguments.layers} m,\ntip {RADIUS_M} m, nu {NU}, neo-Hookean, sticking sphere; "
             "made by 'python -m tools.dent_edge'\nwidth over the patch's, 0 along rims or 1 over the base, "
-            "compliance, bracing"
+            "compliance, bracing, curvature"
         )
-        table = np.column_stack([widths, over_base, amounts, bracing])
+        table = np.column_stack([widths, over_base, amounts.T])
         with atomic_file(Path(arguments.output)) as temporary:
-            np.savetxt(temporary, table, fmt=["%.2f", "%d", "%.4f", "%.4f"], delimiter=",", header=header)
-    return {"amounts": amounts, "bracing": bracing, "left_without": before, "left": after}
+            np.savetxt(temporary, table, fmt=["%.2f", "%d", *3 * ["%.4f"]], delimiter=",", header=header)
+    return {"amounts": amounts, "left_without": before, "left": after}
 
 
 if __name__ == "__main__":

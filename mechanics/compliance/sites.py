@@ -175,14 +175,14 @@ def touch_sites(
     far = own_blocks(solver, points, width, lambda share: progress("touch sites", share))
     far += sharpening(solver, points, width, patch.tip_radius_m)
     far -= half_space_compliance(normals, poisson_ratio, width)
-    bracing = np.zeros(len(points))
+    bracing, rims = np.zeros(len(points)), np.zeros(len(points))
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)
         missed = edge_law(mesh, points, normals)
-        far, bracing = far + missed.far, missed.bracing
+        far, bracing, rims = far + missed.far, missed.bracing, missed.curvature
     if curvature is None:
         curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)
-    bent = np.broadcast_to(np.asarray(curvature, dtype=float), (len(points),))
+    bent = np.asarray(curvature, dtype=float) + rims
     return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio), bracing)
 
 

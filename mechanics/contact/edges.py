@@ -4,7 +4,7 @@ The patch of a touch (mechanics.compliance.sites) is a Gaussian that reaches rou
 presses, and is wider than a contact whose strain meets the base. Solved presses beside rims and above the
 base say what compliance that puts in or leaves out, and how much harder a deep dent is above the base
 (tools.dent_edge). It is laid on as Gaussians summed over the length of the rims and the area of the base, so
-it is smooth from place to place, adds up where edges meet, and ends some patch widths away. Both are numbers
+it is smooth from place to place, adds up where edges meet, and ends some patch widths away. All are numbers
 of a place: the force at it stays the slope of one energy.
 """
 
@@ -25,7 +25,7 @@ TURN_POWER = 3
 """Power of a rim's turn, over a right angle, with which it counts: solved for 60 and 90 degrees."""
 _REACH, _STEP = 3.5, 0.5
 """Widths of a Gaussian beyond which it is left out (0.002); between its samples."""
-_ON_BASE = 0.12
+_ON_BASE = 0.2
 """Patch widths from the base within which a crease is the base's outline, no rim."""
 _AT_ONCE = 1000
 
@@ -33,19 +33,20 @@ _AT_ONCE = 1000
 class EdgeLaw(NamedTuple):
     """far: (k, 3, 3) 1/m, to add to the far field, unit modulus, along the normals alone. bracing: (k,) 1/m,
     to add to the mean curvature by which a deep dent departs from Hertz (mechanics.contact.dent.bend_of): a
-    base close below makes it harder, the more the deeper."""
+    base close below makes it harder, the more the deeper. curvature: (k,) 1/m, to add to the surface's, by
+    which a rim cuts a contact off."""
 
     far: np.ndarray
     bracing: np.ndarray
+    curvature: np.ndarray
 
 
 def edge_law(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> EdgeLaw:
     """At places (k, 3) m with unit normals (k, 3). The base counts on every mesh, rims where its shape is
     known."""
-    _, _, amount, bracing = fitted()
-    near, width = laid(mesh, points, normals), usual_width(mesh)
-    added = near @ amount / width
-    return EdgeLaw(added[:, None, None] * normals[:, :, None] * normals[:, None, :], near @ bracing / width)
+    amounts = np.stack(fitted()[2:])
+    added, bracing, curvature = (laid(mesh, points, normals) @ amounts.T).T / usual_width(mesh)
+    return EdgeLaw(added[:, None, None] * normals[:, :, None] * normals[:, None, :], bracing, curvature)
 
 
 def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -73,12 +74,13 @@ def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=1)
-def fitted() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def fitted() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(g,) widths of Gaussians over the patch's; whether each is laid over the base, or else along the rims;
-    their amounts: compliance times the patch's width and the modulus; bracing times the patch's width."""
+    their amounts: compliance times the patch's width and the modulus; bracing and curvature times the patch's
+    width."""
     table = np.loadtxt(Path(__file__).with_name("dent_edge.csv"), delimiter=",", ndmin=2)
-    widths, over_base, amount, bracing = table.T
-    return widths, over_base > 0, amount, bracing
+    widths, over_base, amount, bracing, curvature = table.T
+    return widths, over_base > 0, amount, bracing, curvature
 
 
 def _summed(

@@ -3,9 +3,8 @@
 Contact is asked at the points of a composite rule on every face: nine parts, three points each. A point that
 presses is anchored where it met the sphere. A sticking point is drawn to its anchor by a spring of `penalty`
 an area; with friction the tangential part of its pull is at most a bound, and the anchor follows (return
-mapping: Simo & Laursen 1992). The bound is mu times the pressure that was found before: with bounds that
-are given (Tresca's friction) the equilibrium is the minimum of a convex energy, so Newton's method finds it,
-and the bounds come to rest in a few rounds. Lengths m, tractions in units of Young's modulus.
+mapping: Simo & Laursen 1992). The bound is mu times the pressure and follows it within Newton's method, whose
+tangent is not symmetric then. Lengths m, tractions in units of Young's modulus.
 """
 
 from __future__ import annotations
@@ -52,18 +51,16 @@ SHAPES, SLOPES = (np.ascontiguousarray(each) for each in _shapes(_POINTS))
 class Grip:
     """What the contact remembers of every point at a converged step, relative to the sphere's centre.
 
-    anchored (p,) bool; anchor (p, 3) m on the sphere; relative (p, 3) m, where the points are; bound (p,) m:
-    of the tangential traction over the penalty.
+    anchored (p,) bool; anchor (p, 3) m on the sphere; relative (p, 3) m, where the points are.
     """
 
     anchored: np.ndarray
     anchor: np.ndarray
     relative: np.ndarray
-    bound: np.ndarray
 
     def copy(self) -> Grip:
         """An independent copy."""
-        return Grip(self.anchored.copy(), self.anchor.copy(), self.relative.copy(), self.bound.copy())
+        return Grip(self.anchored.copy(), self.anchor.copy(), self.relative.copy())
 
 
 @dataclass
@@ -114,21 +111,28 @@ class SphereContact:
     def start(self, centre: np.ndarray) -> Grip:
         """Nothing touches; the sphere's centre is at `centre` m."""
         x = self.places(np.zeros_like(self.points), np.arange(len(self.faces))) - centre
-        return Grip(np.zeros(len(x), dtype=bool), np.zeros_like(x), x, np.zeros(len(x)))
+        return Grip(np.zeros(len(x), dtype=bool), np.zeros_like(x), x)
 
     def evaluate(
-        self, relative: np.ndarray, chosen: np.ndarray, unknowns: np.ndarray, size: int, grip: Grip
+        self,
+        relative: np.ndarray,
+        chosen: np.ndarray,
+        unknowns: np.ndarray,
+        size: int,
+        grip: Grip,
+        sticks: bool = False,
     ) -> Traction:
         """The contact of the faces `chosen` (c,) whose points are at `relative` (c q, 3) to the centre.
 
-        unknowns: (c, 18), the numbers below `size` of the faces' degrees of freedom.
+        unknowns: (c, 18), the numbers below `size` of the faces' degrees of freedom. sticks: whatever the
+        friction, which carries the points along with a sphere that has moved.
         """
-        own = self.of_faces(chosen)
+        own, friction = self.of_faces(chosen), -1.0 if sticks else self.friction
         forces, stiffness, force = np.zeros(size), np.zeros((size, size)), np.zeros(3)
         overlap, slid = np.zeros(len(own)), np.zeros((len(own), 3))
         _evaluate(
-            relative, self.weights[chosen].ravel(), unknowns, self.radius, self.friction, self.penalty,
-            grip.anchored[own], grip.anchor[own], grip.bound[own], SHAPES,
+            relative, self.weights[chosen].ravel(), unknowns, self.radius, friction, self.penalty,
+            grip.anchored[own], grip.anchor[own], SHAPES,
             np.empty((3, 3)), np.empty(3), np.empty(3),
             forces, stiffness, force, overlap, slid,
         )  # fmt: skip
@@ -148,7 +152,7 @@ class SphereContact:
 
 @kernel
 def _evaluate(
-    relative, weights, unknowns, radius, friction, penalty, anchored, anchor, bound, shapes, block, t, s,
+    relative, weights, unknowns, radius, friction, penalty, anchored, anchor, shapes, block, t, s,
     forces, stiffness, force, overlap, slid,
 ):  # fmt: skip
     count = shapes.shape[0]
@@ -187,7 +191,7 @@ def _evaluate(
                 s[0], s[1] = along * mx - anchor[k, 0], along * my - anchor[k, 1]
                 s[2] = along * mz - anchor[k, 2]
                 size = np.sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2])
-                most = bound[k]
+                most = friction * deep
                 slips = size > most and size > 0.0
                 grip = most / size if slips else 1.0
                 for i in range(3):
@@ -200,6 +204,7 @@ def _evaluate(
                         if slips:
                             across = along / far * (side - s[i] * s[j] / (size * size))
                             block[i, j] += grip * (across - m_i * s[j] / far)
+                            block[i, j] -= friction * s[i] / size * m_j
                         else:
                             block[i, j] += ds
                 if slips:

@@ -42,7 +42,7 @@ class PressOptions:
     friction: float | None = None
     finest: float = 0.5
     growth: float = 0.8
-    zone: float = 3.5
+    zone: float = 6.0
     reach: float = 1.1
     step: float = 0.2
     penalty: float = 1500.0

@@ -13,9 +13,9 @@ import scipy.linalg as la
 from mechanics.press_solver.condensing import Condensed
 from mechanics.press_solver.contact import Grip, SphereContact, Traction
 
-_ROUNDS, _SLIDING_ROUNDS, _ITERATIONS = 3, 8, 60
-_AT_REST = 5e-3
-"""Change of the friction's bounds from round to round, over their sum."""
+_ROUNDS, _ITERATIONS, _SLIDING_ITERATIONS = 3, 60, 30
+_MOVED = 4e-3
+"""Overlap over the sphere's radius from which it has been moved, and carries its points along first."""
 _SETTLED = 1e-5
 """Of the residual over the contact's forces."""
 _REACH = 0.12
@@ -101,15 +101,16 @@ class Settling:
         unknowns = local[self._of_face[chosen]]
         moved = u.copy()
 
-        def at(x: np.ndarray) -> Balance:
+        def at(x: np.ndarray, sticks: bool = False) -> Balance:
             moved[few] = u[few] + x
             relative = self._relative(moved, chosen, centre)
-            traction = self.contact.evaluate(relative, chosen, unknowns, len(few), trial)
+            traction = self.contact.evaluate(relative, chosen, unknowns, len(few), trial, sticks)
             return small.stiffness @ x - pull + traction.forces, traction, relative
 
         x = np.zeros(len(few))
-        for _ in range(_SLIDING_ROUNDS if self.contact.friction > 0 else _ROUNDS):
-            solved = self._newton(x, small.stiffness, at)
+        for _ in range(_ROUNDS):
+            settled = self._sliding if self.contact.friction > 0.0 else self._newton
+            solved = settled(x, small.stiffness, at)
             if solved is None:
                 return None
             x, traction, relative = solved
@@ -132,7 +133,7 @@ class Settling:
     ) -> tuple[np.ndarray, Traction, np.ndarray] | None:
         residual, traction, relative = at(x)
         for _ in range(_ITERATIONS):
-            step = _solved(small + traction.stiffness, -residual, symmetric=not self.contact.friction > 0)
+            step = _solved(small + traction.stiffness, -residual)
             longest = np.abs(step).max()
             if not np.isfinite(longest):
                 return None
@@ -149,6 +150,36 @@ class Settling:
             scale = float(np.linalg.norm(traction.forces)) + 1e-9 * self.contact.radius**2
             if np.linalg.norm(residual) < _SETTLED * scale:
                 return x, traction, relative
+        return None
+
+    def _sliding(
+        self, x: np.ndarray, small: np.ndarray, at: Callable[..., Balance]
+    ) -> tuple[np.ndarray, Traction, np.ndarray] | None:
+        """With Coulomb's friction no energy leads the way: a sphere that has moved carries its points along
+        as if they stuck, and lets them slip from there."""
+        residual, traction, relative = at(x)
+        if traction.overlap.max(initial=0.0) > _MOVED * self.contact.radius:
+            carried = self._newton(x, small, lambda y: at(y, True))
+            if carried is None:
+                return None
+            x = carried[0]
+            residual, traction, relative = at(x)
+        for _ in range(_SLIDING_ITERATIONS):
+            scale = float(np.linalg.norm(traction.forces)) + 1e-9 * self.contact.radius**2
+            before = float(np.linalg.norm(residual))
+            if before < _SETTLED * scale:
+                return x, traction, relative
+            step = np.linalg.solve(small + traction.stiffness, -residual)
+            if not np.isfinite(step).all():
+                return None
+            step *= min(1.0, 0.5 * self.contact.radius / max(np.abs(step).max(), 1e-300))
+            share = 1.0
+            for _ in range(5):
+                residual, traction, relative = at(x + share * step)
+                if np.linalg.norm(residual) < before:
+                    break
+                share *= 0.5
+            x = x + share * step
         return None
 
     def _arrived(
@@ -171,12 +202,6 @@ class Settling:
         fresh = ~trial.anchored[points]
         trial.anchored[points], trial.anchor[points] = True, met
         far = 1e-4 * self.contact.radius
-        bound = self.contact.friction * np.maximum(traction.overlap, 0.0)
-        change = np.abs(bound - trial.bound[own]).sum()
-        # pressure answers friction: half way, the two do not chase each other
-        trial.bound[own] = np.where(trial.bound[own] > 0, 0.5 * (bound + trial.bound[own]), bound)
-        if self.contact.friction > 0:
-            return bool(change > _AT_REST * bound.sum())
         return bool(pulls.any() or fresh.any() or (shift > far).any())
 
     def kept_grip(self, u: np.ndarray, centre: np.ndarray, found: Settled) -> Grip:
@@ -190,13 +215,12 @@ class Settling:
         here = relative * (self.contact.radius / np.linalg.norm(relative, axis=1, keepdims=True))
         anchor = np.where(held[:, None], traction.slid, here)
         self.refused[:] = False
-        return Grip(pressing, anchor, relative, grip.bound)
+        return Grip(pressing, anchor, relative)
 
 
-def _solved(matrix: np.ndarray, right: np.ndarray, symmetric: bool) -> np.ndarray:
-    """By Cholesky where the matrix (k, k) allows it: half of the time."""
-    if symmetric:
-        with contextlib.suppress(la.LinAlgError):
-            factor = la.cho_factor(matrix, lower=True, check_finite=False)
-            return la.cho_solve(factor, right, check_finite=False)
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """By Cholesky where the symmetric matrix (k, k) allows it: half of the time."""
+    with contextlib.suppress(la.LinAlgError):
+        factor = la.cho_factor(matrix, lower=True, check_finite=False)
+        return la.cho_solve(factor, right, check_finite=False)
     return np.linalg.solve(matrix, right)

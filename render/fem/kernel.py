@@ -35,30 +35,32 @@ def fem_step(p, state, tips):
     for i in range(m):
         if not (np.isfinite(tips[i, 0]) and np.isfinite(tips[i, 1]) and np.isfinite(tips[i, 2])):
             lose(grip, i)
-        elif grip.triangle[i] >= 0 and strayed(
-            p.surface,
-            tips[i],
-            state.points[i],
-            state.normals[i],
-            state.radii_m[i],
-            state.vectors[0],
-            state.stack,
-        ):
-            forget(state, i)
-            release(grip, i, tips[i])
-        elif grip.triangle[i] < 0 and approach(
-            p.surface,
-            grip,
-            tips[i],
-            i,
-            state.radii_m[i],
-            state.points[i],
-            state.normals[i],
-            state.vectors,
-            state.stack,
-        ):
-            new_frame(state.frames[i], state.normals[i])
-            forget(state, i)
+        else:
+            if grip.triangle[i] >= 0 and strayed(
+                p.surface,
+                tips[i],
+                state.points[i],
+                state.normals[i],
+                state.radii_m[i],
+                state.vectors[0],
+                state.stack,
+            ):
+                forget(state, i)
+                release(grip, i, tips[i])
+            # a tip that has strayed from its anchor may still overlap the object elsewhere: no tick without
+            if grip.triangle[i] < 0 and approach(
+                p.surface,
+                grip,
+                tips[i],
+                i,
+                state.radii_m[i],
+                state.points[i],
+                state.normals[i],
+                state.vectors,
+                state.stack,
+            ):
+                new_frame(state.frames[i], state.normals[i])
+                forget(state, i)
         if grip.triangle[i] < 0:
             leave(state, i)
             state.touching[i] = 0

@@ -122,7 +122,8 @@ def create(name: str, model: Model, options: RenderOptions, progress: Progress =
 class Field(NamedTuple):
     """far (v, 3, 3) 1/m and curvature (v,) 1/m at the fine vertices, unit modulus, zero on the base.
 
-    curvatures: (v, 2) 1/m the principal ones whose mean that is, convex positive, the greatest first.
+    curvatures: (v, 2) 1/m the principal ones, convex positive, the greatest first: curvature is their mean,
+    and what a rim close by adds (mechanics.contact.edges).
 
     bracing: (v,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges).
     softness: (v,) of the material under a tip, global modulus over its own.
@@ -161,4 +162,6 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
         )
     curvatures = np.zeros((len(arrays.vertices), 2))
     curvatures[touched] = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)
-    return Field(far, curvatures.mean(axis=1), curvatures, bracing, softness, parents)
+    curvature = curvatures.mean(axis=1)
+    curvature[touched] += missed.curvature
+    return Field(far, curvature, curvatures, bracing, softness, parents)

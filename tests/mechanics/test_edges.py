@@ -45,13 +45,27 @@ def wall(*height_m: float) -> tuple[np.ndarray, np.ndarray]:
 def test_a_rim_is_soft_at_first_and_the_harder_the_deeper_and_nothing_further_in(block):
     law = edge_law(block, *top(0.0, 0.005, 0.03))
     at_edge, beside, far = law.far
-    assert 0.8 * HALF_SPACE > at_edge[2, 2] > 0.3 * HALF_SPACE
+    assert 0.9 * HALF_SPACE > at_edge[2, 2] > 0.3 * HALF_SPACE
     assert 0 < beside[2, 2] < 0.1 * HALF_SPACE
     assert not far.any()
     assert np.count_nonzero(beside) == 1  # along the normal alone
     at_edge, beside, far = 0.005 * law.bracing
-    assert at_edge > 1.5 > 1 > beside > 0.5
+    assert 1 > beside > 0.5 > at_edge > 0.3
     assert far == 0
+
+
+def test_a_contact_that_a_rim_cuts_off_is_softer_from_the_first_touch_on(block):
+    points, normals = top(0.0, 0.001, 0.005)
+    at_edge, beside, within = 0.005 * edge_law(block, points, normals).curvature
+    assert at_edge > 1 > beside > 0.5
+    assert within == 0
+    sites = touch_sites(block, points, normals, 0.49, curvature=0.0)
+    depths, starts = np.linspace(0, 8e-3, 81), np.array([0, 81, 162, 243])
+    law = {"young_modulus_pa": 1.0, "tip_radius_m": 0.005, "law": "neo-hookean"}
+    force = forces_at(sites, np.tile(depths, 3)[:, None] * -UP, starts, **law)[:, 2].reshape(3, 81)
+    assert (np.diff(force, axis=1) > 0).all()
+    assert force[0, 10] < 0.75 * force[2, 10]
+    assert (np.diff(force[:, 10:], axis=0) > 0).all()
 
 
 def test_the_base_holds_what_lies_close_above_it(block):

@@ -195,3 +195,14 @@ def test_a_tip_that_slides_drags_by_coulombs_law():
     assert abs(pressed.force[0, 0]) < 0.01 * pressed.force[0, 2]
     # the dent leans against the tip: a few hundredths beside friction
     assert -pressed.force[-1, 0] / pressed.force[-1, 2] == pytest.approx(0.3, abs=0.05)
+
+
+@pytest.mark.slow
+def test_a_slippery_tip_goes_deep_with_less_force_than_one_that_sticks():
+    depths = np.array([2e-3, 4e-3, 6e-3])
+    forces = [
+        half_space(friction=friction, finest=0.9, growth=1.3, zone=3.5).press(TOP, UP, depths).force[:, 2]
+        for friction in (0.0, 0.15, None)
+    ]
+    assert np.isfinite(forces).all()
+    assert (np.diff(forces, axis=0)[:, 1:] > 0).all()

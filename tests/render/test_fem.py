@@ -148,6 +148,17 @@ def test_sliding_over_triangles_and_over_the_rim_never_steps(cylinder_renderer, 
     assert jump.max() < 0.02
 
 
+def test_a_tip_that_is_dragged_off_a_rim_is_held_by_what_it_still_overlaps_at_once(cylinder_renderer):
+    renderer = cylinder_renderer.with_friction(1.0)
+    inwards = np.linspace([0.038, 0.0, 0.088], [0.038, 0.0, 0.079], 60)
+    off = inwards[-1] + np.arange(1, 500)[:, None] * [2e-5, 0, 0]
+    force, _ = run(renderer, np.vstack([inwards, off]))
+    size = np.linalg.norm(force[:, 0], axis=1)
+    assert size[60:300].min() > 0.1
+    lost = (size[1:-1] == 0) & (size[:-2] > 1e-3) & (size[2:] > 1e-3)
+    assert not lost.any()
+
+
 def test_a_thin_wall_is_not_popped_through(thin_renderer):
     deep = np.linspace([0, 0.012, 0.025], [0, -0.02, 0.025], 400)
     force, state = run(thin_renderer, deep)

@@ -210,5 +210,6 @@ def force_band(renderer: FemRenderer, depth_m: np.ndarray) -> np.ndarray:
     if np.isfinite([low, high]).all():
         modulus = 0.5 * (high - low) / model.material.young_modulus_pa
     radius = model.tool.tip_radius_m
-    numbers = place_numbers(renderer, radius)
-    return np.hypot(modulus, law_share(depth_m / radius, *numbers[:, :, None]))
+    numbers, parameters = place_numbers(renderer, radius)[:, :, None], renderer.parameters
+    nu, mu = float(parameters.poisson_ratio[0]), float(parameters.friction[0])
+    return np.hypot(modulus, law_share(depth_m / radius, *numbers, poisson_ratio=nu, friction=mu))
