@@ -33,12 +33,12 @@ class DepthFactors:
 
     @classmethod
     def fitted(
-        cls, count: int, told: Mapping[int, tuple[np.ndarray, np.ndarray, np.ndarray]]
+        cls, count: int, presses: Mapping[int, tuple[np.ndarray, np.ndarray, np.ndarray]]
     ) -> DepthFactors:
-        """Least squares, weighed by the force. told: of some of `count` places depths (d,) m, the law's and
-        the solved force (d,) N."""
+        """Least squares, weighed by the force. presses: at some of `count` places, depths (d,) m, the law's
+        and the solved force (d,) N."""
         found = cls.none(count)
-        for place, (depth, law, solved) in told.items():
+        for place, (depth, law, solved) in presses.items():
             degree = min(_DEGREE, len(depth) - 1)
             at = np.polynomial.polynomial.polyfit(depth / depth[-1], solved / law, degree, w=law)
             found.cubic[place] = 0.0
