@@ -53,32 +53,31 @@ def _waist() -> KnownShape:
 
 
 def _wedge() -> KnownShape:
-    given, low, high, length, width = phantom("wedge"), 0.032, 0.058, 0.100, 0.080
-    slope = (high - low) / length
-    up = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
-
-    def distance(p: np.ndarray) -> np.ndarray:
-        top = (p - [0.0, 0.0, (low + high) / 2]) @ up
-        return np.maximum(np.maximum(np.abs(p[:, 0]) - length / 2, np.abs(p[:, 1]) - width / 2), top)
-
-    corners = np.array([[a * length / 2, b * width / 2] for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
-    tops = np.column_stack([corners, (low + high) / 2 + slope * corners[:, 0]])
-    edges = [(tops[k], tops[k - 1]) for k in range(4)] + [(t, t * [1, 1, 0]) for t in tops]
-    return KnownShape("wedge", given.vertices, given.faces, distance, _lines(edges))
+    given = phantom("wedge")
+    return _prism("wedge", given.vertices, given.faces, (0.100, 0.080), 0.032, 0.058)
 
 
 def _plate() -> KnownShape:
     length, width, height = _PLATE
     vertices, faces = stacked(rectangle(length, width), column(width / 2, height))
+    return _prism("plate", vertices, faces, (length, width), height, height)
+
+
+def _prism(
+    name: str, vertices: np.ndarray, faces: np.ndarray, base: tuple[float, float], low: float, high: float
+) -> KnownShape:
+    """On a rectangle of length and width `base`; its top rises along the length from `low` to `high`."""
+    half, slope, middle = np.array(base) / 2, (high - low) / base[0], (low + high) / 2
+    up = np.array([-slope, 0.0, 1.0]) / np.hypot(slope, 1.0)
 
     def distance(p: np.ndarray) -> np.ndarray:
-        return np.maximum(np.abs(p[:, :2]) - np.array([length, width]) / 2, p[:, 2:] - height).max(axis=1)
+        beside = (np.abs(p[:, :2]) - half).max(axis=1)
+        return np.maximum(beside, (p - [0.0, 0.0, middle]) @ up)
 
-    corners = [
-        np.array([a * length / 2, b * width / 2, height]) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))
-    ]
-    edges = [(corners[k], corners[k - 1]) for k in range(4)] + [(c, c * [1, 1, 0]) for c in corners]
-    return KnownShape("plate", vertices, faces, distance, _lines(edges))
+    corners = half * np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
+    tops = np.column_stack([corners, middle + slope * corners[:, 0]])
+    edges = [(tops[k], tops[k - 1]) for k in range(4)] + [(t, t * [1, 1, 0]) for t in tops]
+    return KnownShape(name, vertices, faces, distance, _lines(edges))
 
 
 def _lines(edges: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

@@ -21,10 +21,9 @@ from benchmarks._known_shapes import KnownShape
 from benchmarks._more_shapes import EIGHT, KINDS, kinds, thickness
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import TIP_M, meshed, own_compliance_near
-from benchmarks.law_by_place import FINENESS
+from benchmarks.law_by_place import FINENESS, kept_force
 from benchmarks.timing import table
 from mechanics.disk.store import content_key
-from mechanics.disk.writing import atomic_file
 from mechanics.errors import PalpateError
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool
@@ -34,7 +33,6 @@ from palpate.output import progress_bar
 from render.fem.renderer import FemRenderer
 from render.force_error import law_share, place_numbers
 from render.options import RenderOptions
-from scenes.laboratory.mesh import laboratory_cache
 from scenes.laboratory.specimen import Specimen, build
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom
@@ -128,14 +126,7 @@ def kept(name: str, shape: KnownShape, one: Drawn, solve: Solve) -> np.ndarray:
     equilibrium. From the user's cache where it is there."""
     words = (name, repr(one.friction), repr(one.poisson_ratio))
     key = content_key("law bound", *words, shape.vertices, shape.triangles, one.point, one.normal, one.depths)
-    path = laboratory_cache() / "presses" / f"{key}.npy"
-    if path.is_file():
-        return np.load(path)
-    force = solve(shape, one)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_file(path) as temporary, temporary.open("wb") as handle:
-        np.save(handle, force)
-    return force
+    return kept_force(key, lambda: solve(shape, one))
 
 
 def own_solver(mesh: TetMesh) -> Solve:

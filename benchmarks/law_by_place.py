@@ -11,6 +11,7 @@ Solved presses are kept in the user's cache.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -178,10 +179,15 @@ def _kept(solve: Laboratory | OwnSolver, point: np.ndarray, normal: np.ndarray) 
     """What `solve` answers at a place, from the user's cache where it is there."""
     shape = solve.shape
     key = content_key(solve.name, shape.vertices, shape.triangles, point, normal, DEPTHS_M, solve.made_of)
+    return kept_force(key, lambda: solve(point, normal))
+
+
+def kept_force(key: str, solve: Callable[[], np.ndarray]) -> np.ndarray:
+    """(d,) m^2 what `solve` answers, from the user's cache where it is there under its content key."""
     path = laboratory_cache() / "presses" / f"{key}.npy"
     if path.is_file():
         return np.load(path)
-    force = solve(point, normal)
+    force = solve()
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(path) as temporary, temporary.open("wb") as handle:
         np.save(handle, force)

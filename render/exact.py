@@ -21,7 +21,7 @@ from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
 from mechanics.effects.unbonded_base import EFFECT as UNBONDED
 from mechanics.errors import OptionError
 from mechanics.press_solver.press import PressOptions
-from mechanics.press_solver.solved_places import PlacesLeft, SolvedPlace, SolvedPresses, check_laws
+from mechanics.press_solver.solved_places import PlacesLeft, SolvedPlace, SolvedPresses, check_laws, felt_of
 from mechanics.presses.table import Presses
 from mechanics.progress import Progress, silent
 from render.base import Renderer
@@ -66,8 +66,8 @@ class ExactPlaces:
         model, touch = renderer.model, rendered_touch(renderer.model, renderer.options)
         self.renderer, self.tip_m = renderer, float(tip_radius_m or model.tool.tip_radius_m)
         self.options = options or press_options(renderer)
-        arrays, shape = renderer.contact.arrays, model.mesh.shape
-        surface = (arrays.vertices, arrays.triangles) if shape is None else (shape.vertices, shape.triangles)
+        arrays = renderer.contact.arrays
+        surface = felt_of(model.mesh, (arrays.vertices, arrays.triangles))
         self._presses = SolvedPresses(
             model.mesh.linear(), surface, model.element_ratio, poisson_ratio=model.material.poisson_ratio,
             tip_radius_m=self.tip_m * touch.tip_ratio, options=self.options,

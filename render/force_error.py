@@ -59,8 +59,7 @@ def force_errors(
     steepness = _STEEPNESS * size / depth
     vertices, row = np.unique(near, return_inverse=True)
     numbers = place_numbers(renderer, tip_radius_m, vertices)[:, row.ravel()]
-    nu, mu = float(renderer.parameters.poisson_ratio[0]), float(renderer.parameters.friction[0])
-    shares = law_share(depth / tip_radius_m, *numbers, poisson_ratio=nu, friction=mu)
+    shares = rendered_share(renderer, depth / tip_radius_m, numbers)
     uncertain = felt_surface(renderer.model).uncertainty_m
     sd = uncertain[near] if len(uncertain) == len(surface.vertices) else np.zeros(len(size))
     onset = ONSET_NOISE_M if len(renderer.model.presses) else 0.0
@@ -97,6 +96,13 @@ def place_numbers(
     bent = np.abs(parameters.curvature[vertices])
     rim, base = nearness(mesh, points, normals)
     return np.stack([bent * tip_radius_m, sideways * tip_radius_m, rim, base])
+
+
+def rendered_share(renderer: FemRenderer, depth: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (4, ...), place_numbers."""
+    given = renderer.parameters
+    nu, mu = float(given.poisson_ratio[0]), float(given.friction[0])
+    return law_share(depth, *numbers, poisson_ratio=nu, friction=mu)
 
 
 def law_share(

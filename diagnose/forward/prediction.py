@@ -7,9 +7,9 @@ elastic object -> what follows the path (softening, memory, adhesion) -> what th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -55,6 +55,11 @@ class Forward:
         """(n, 3) m/s^2, device frame, press by press from the thinned positions as they were read."""
         t = self._as_read
         return np.concatenate([acceleration(t.t[part], t.position[part]) for part in t.parts])
+
+    def of(self, presses: np.ndarray) -> Self:
+        """The same of some presses (p,) bool."""
+        exact = None if self.exact is None else self.exact.of(presses)
+        return replace(self, touches=self.touches.of(presses), places=self.places.of(presses), exact=exact)
 
     def law_error(self, usual: float) -> np.ndarray:
         """(p,) standard error of the law as a share of the force; the usual one where nothing is solved."""
@@ -190,4 +195,4 @@ def solved(forward: Forward, progress: Progress = silent) -> Forward:
         poisson_ratio=model.material.poisson_ratio, young_modulus_pa=model.material.young_modulus_pa,
         tip_radius_m=forward.tip_radius, surface=(felt.points, felt.triangles), progress=progress,
     )  # fmt: skip
-    return Forward(t, places, exact=exact)
+    return replace(forward, exact=exact)

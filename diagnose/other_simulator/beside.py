@@ -52,8 +52,7 @@ def beside(presses: Presses, model: Model, given: Aligned, findings: Findings, s
     np.minimum.at(fell_s, presses.press[own][signal.left], signal.t[signal.left])
     real = findings.forward
     rows = raw.rows(np.flatnonzero(keep))
-    exact = None if real.exact is None else real.exact.of(keep)
-    forward = StatedForward(mended.of(keep), real.places.of(keep), stated, exact=exact)
+    forward = StatedForward(mended, real.places, stated, exact=real.exact).of(keep)
     fell_s = fell_s[np.searchsorted(presses.onset_s, forward.touches.onset_s)]
     keys = {name: values for name, (_, values) in seen.items()}
     return Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes)
@@ -72,8 +71,7 @@ def named_numerics(sides: Sides, rules: AttributionOptions, progress: Progress) 
     sides = dataclasses.replace(sides, fell_s=np.where(held, sides.fell_s, -np.inf))
     if held.all() and np.isinf(sides.fell_s).all():
         return _with_seen(sides, numerics_of(forward, rules, progress))
-    exact = None if forward.exact is None else forward.exact.of(held)
-    of_held = StatedForward(cut.of(held), forward.places.of(held), forward.stated, exact=exact)
+    of_held = dataclasses.replace(forward, touches=cut).of(held)
     return _with_seen(sides, _over_all(sides, numerics_of(of_held, rules, progress), held))
 
 

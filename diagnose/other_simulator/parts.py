@@ -116,7 +116,7 @@ def reality_of(findings: Findings, named: Sequence[str], strain: Sequence[Effect
 
 def law_at(forward: StatedForward, stated: Stated, numerics: Numerics) -> np.ndarray:
     """(n, 3) N: our law at other parameters, with finite strain where the simulator has it."""
-    other = StatedForward(forward.touches, forward.places, stated, exact=forward.exact)
+    other = dataclasses.replace(forward, stated=stated)
     settings = settings_of(other, numerics.strain, np.array([np.log(stated.young_modulus_pa)]))
     return np.nan_to_num(other.predict(settings))
 

@@ -6,6 +6,7 @@ on the others: a mesh that is half too soft takes half of what a wrong tip adds.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -30,7 +31,7 @@ def sizes_alone(
     law = law_at(forward, measured, numerics)
     # what the samples themselves show is a share of the force that is there
     level = weighing.rms_n(law) / max(weighing.rms_n(numerics.with_numerics), 1e-12)
-    right = StatedForward(forward.touches, forward.places, measured, exact=forward.exact)
+    right = dataclasses.replace(forward, stated=measured)
     sizes = {}
     for name in numerics.named:
         if name not in numerics.values:

@@ -101,11 +101,15 @@ class SolvedPresses:
         return made["force"] @ normal
 
 
-def felt_of(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:
+def felt_of(
+    mesh: TetMesh, surface: tuple[np.ndarray, np.ndarray] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """(vertices (v, 3) m, triangles (k, 3)) of what a tip feels: the mesh's own shape where it is known, else
-    its boundary."""
+    `surface`, else its boundary."""
     if mesh.shape is not None:
         return mesh.shape.vertices, mesh.shape.triangles
+    if surface is not None:
+        return surface
     linear = mesh.linear()
     used, triangles = np.unique(linear.surface, return_inverse=True)
     return linear.points[used], triangles.reshape(-1, 3)
@@ -177,9 +181,9 @@ def solve_touched(
     """
     check_laws(laws)
     linear, deepest = mesh.linear(), deepest_of_sites(touched.site, touched.deepest_m)
-    surface = felt_of(mesh) if mesh.shape is not None or surface is None else surface
+    surface = felt_of(mesh, surface)
     count, clock = len(touched.site), PlacesLeft(len(deepest) * len(laws))
-    told: dict[str, dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]] = {law: {} for law in laws}
+    by_site: dict[str, dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]]] = {law: {} for law in laws}
     found: list[tuple[SolvedPlace, int]] = []
     for law in laws:
         options = PressOptions(law=law, coupled=law != "linear")
@@ -191,15 +195,15 @@ def solve_touched(
             one = _solved(presses, touched, press, depth, law)
             if one is None:
                 continue
-            told[law][int(touched.site[press])] = (one.depth_m, one.law_n, one.solved_n)
+            by_site[law][int(touched.site[press])] = (one.depth_m, one.law_n, one.solved_n)
             scaled = young_modulus_pa * one.law_n, young_modulus_pa * one.solved_n
             place = SolvedPlace(one.point, one.normal, one.depth_m, *scaled, law=law)
             found.append((place, int(touched.site[press])))
-    whole = set.intersection(*(set(own) for own in told.values()))
+    whole = set.intersection(*(set(own) for own in by_site.values()))
     on_solved = [(press, site) for press, site in enumerate(touched.site.tolist()) if site in whole]
     factors = {
         law: DepthFactors.fitted(count, {press: own[site] for press, site in on_solved})
-        for law, own in told.items()
+        for law, own in by_site.items()
     }
     places = [one for one, site in found if site in whole]
     return ExactPresses(factors, places, len(deepest) - len(whole))

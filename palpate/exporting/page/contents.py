@@ -19,7 +19,7 @@ from palpate.exporting.page.packed import Block, modes_of
 from palpate.exporting.page.tables import depths_of, greatest_depth, responses, straight_forces
 from render.base import Renderer
 from render.fem.renderer import FemRenderer
-from render.force_error import law_share, place_numbers
+from render.force_error import place_numbers, rendered_share
 from render.registry import create
 
 ONE_D = "hunt-crossley"
@@ -210,6 +210,5 @@ def force_band(renderer: FemRenderer, depth_m: np.ndarray) -> np.ndarray:
     if np.isfinite([low, high]).all():
         modulus = 0.5 * (high - low) / model.material.young_modulus_pa
     radius = model.tool.tip_radius_m
-    numbers, parameters = place_numbers(renderer, radius)[:, :, None], renderer.parameters
-    nu, mu = float(parameters.poisson_ratio[0]), float(parameters.friction[0])
-    return np.hypot(modulus, law_share(depth_m / radius, *numbers, poisson_ratio=nu, friction=mu))
+    numbers = place_numbers(renderer, radius)[:, :, None]
+    return np.hypot(modulus, rendered_share(renderer, depth_m / radius, numbers))

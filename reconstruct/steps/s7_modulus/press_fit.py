@@ -81,8 +81,8 @@ def fit_law(
     normals = sites.normals[press]
     used = -np.einsum("ij,ij->i", data.displacement, normals) < depth_m
     squared_force = np.einsum("ij,ij->i", data.force, data.force)
-    share = sites.law_error(law_error)[press]
-    weight = np.where(used, 1.0 / (noise_n**2 + share**2 * squared_force / 3), 0.0)
+    share = sites.law_error(law_error)
+    weight = np.where(used, 1.0 / (noise_n**2 + share[press] ** 2 * squared_force / 3), 0.0)
 
     def unit(shift: np.ndarray) -> np.ndarray:
         return forces_at(
@@ -129,9 +129,7 @@ def fit_law(
     rms = np.sqrt(squared / np.maximum(rows, 1))
     felt = np.sqrt(np.bincount(press, weights=used * squared_force, minlength=k) / np.maximum(rows, 1))
     missed = rms / np.maximum(felt, 1e-300)
-    follows = missed < _FOLLOWS * np.hypot(
-        sites.law_error(law_error), np.sqrt(3) * noise_n / felt.clip(1e-300)
-    )
+    follows = missed < _FOLLOWS * np.hypot(share, np.sqrt(3) * noise_n / felt.clip(1e-300))
     error = np.where(follows, error, np.maximum(error, missed))
     return LawFit(law, depth_m, e, error, shift, rms, cost, rows)
 
