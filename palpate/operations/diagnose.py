@@ -32,10 +32,12 @@ from palpate.operations._shared import (
     seed_operand,
 )
 from palpate.operations._simulators import (
+    fewest,
     mended,
     numbers_operand,
     run_along,
     settings_operand,
+    simulator,
     simulator_operand,
 )
 from palpate.operations.load import load
@@ -47,10 +49,10 @@ from render.registry import check_settings
 if TYPE_CHECKING:
     from diagnose.other_simulator.result import SimulatedGap
     from diagnose.verdict.result import Diagnosis
-    from mechanics.model.model import Model
     from mechanics.progress import Progress
     from mechanics.recording.recording import Recording
     from palpate.operations._shared import ModelLike, RecordingLike
+    from render.simulators.base import SimulatorRenderer
 
 
 @dataclass(frozen=True)
@@ -190,31 +192,34 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
         if forces is not None:
             simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
             return diagnose_simulated(measured, made, simulation, options, rest, **rules)
-        settings, numbers = asked.simulator_settings, asked.simulator_set
-
-        def simulation_of(settings: str, numbers: str, tell: Progress) -> Any:
-            return _simulation(asked, call, measured, made, settings, numbers, tell)
-
+        assert asked.renderer is not None
         told = part(tell, begun, 1.0)
-        simulation = simulation_of(settings, numbers, part(told, 0.0, 0.4))
+        runs = [simulator(asked.renderer, *each, made) for each in _settings(asked)]
+        most = asked.presses or fewest(runs)
+        simulation = _simulation(asked, call, measured, runs[0], most, part(told, 0.0, 0.4))
         found = diagnose_simulated(measured, made, simulation, options, part(told, 0.4, 0.8), **rules)
         if asked.mended is None:
             return found
-        after = mended(settings, numbers, asked.mended)
-        again = simulation_of(*after, part(told, 0.8, 0.95))
+        again = _simulation(asked, call, measured, runs[1], most, part(told, 0.8, 0.95))
         left = diagnose_simulated(
             measured, made, again, options, part(told, 0.95, 1.0), reality=found.reality, **rules
         )
         return replace(found, mended=Mended(again.run_as, left.gap_before_n, left.effects))
 
 
+def _settings(asked: DiagnoseOperands) -> list[tuple[str, str]]:
+    """(settings, numbers) of each run of --renderer: as asked, then mended."""
+    settings, numbers = asked.simulator_settings, asked.simulator_set
+    runs = [(settings, numbers)]
+    return runs if asked.mended is None else [*runs, mended(settings, numbers, asked.mended)]
+
+
 def _simulation(
     asked: DiagnoseOperands,
     call: Call,
     measured: Recording,
-    model: Model,
-    settings: str,
-    numbers: str,
+    made: SimulatorRenderer,
+    most: int | None,
     tell: Progress,
 ) -> Any:
     """A simulator that is run along the recorded path; and what it says of itself."""
@@ -222,17 +227,16 @@ def _simulation(
     from diagnose.other_simulator.pipeline import Asked
     from diagnose.other_simulator.stated import stated_of, stated_values
 
-    assert asked.renderer is not None
-    ran = run_along(asked.renderer, settings, numbers, model, measured, tell, most=asked.presses, usual=True)
+    ran = run_along(made, measured, tell, most=most)
     run, there = int(ran.chosen.sum()), len(ran.chosen)
     some = f", spread over its places (--presses {there}: all)" if run < there else ""
     notes = (
         f"run here along {run} of the {there} recorded presses{some}: {ran.said}",
         *(f"it cannot say: {x}" for x in ran.adapter.cannot),
     )
-    forces = Forces(measured.t, ran.force, asked.renderer, notes, ran.chosen)
+    forces = Forces(measured.t, ran.force, made.name, notes, ran.chosen)
     # what the adapter gave it, but for what is said
-    stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
+    stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, made.model)
     own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
     of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
     return Asked(forces, stated, own_clock, *of_adapter)
@@ -247,8 +251,7 @@ def _forces(asked: DiagnoseOperands) -> Any:
     if asked.presses is not None and asked.renderer is None:
         raise OptionError("--presses says over how many a simulator is run: name it by --renderer")
     if asked.renderer is not None:
-        settings, numbers = asked.simulator_settings, asked.simulator_set
-        for each in ((settings, numbers), mended(settings, numbers, asked.mended or "")):
+        for each in _settings(asked):
             check_settings(asked.renderer, *each)
     if asked.simulated is None:
         if asked.stated and asked.renderer is None:

@@ -1,10 +1,20 @@
 """Another simulator that is run along a recorded path: its settings, and what mends them."""
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
 import pytest
 
 import palpate as pp
 from mechanics.errors import OptionError
-from palpate.operations._simulators import mended, told
+from palpate.operations import diagnose
+from palpate.operations._simulators import Ran, mended, told
+
+from ...render import shapes
 
 
 def test_what_mends_goes_on_top_of_what_was_asked():
@@ -18,6 +28,50 @@ def test_what_mends_goes_on_top_of_what_was_asked():
 def test_a_long_run_says_how_long_and_what_fewer_presses_take():
     assert told(1200.0, 12) == "about 20 min in all; --presses 6 takes 10"
     assert told(30.0, 12) == "about 0.5 min in all" and "--presses" not in told(1200.0, 6)
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """As much of a SimulatedGap as a run again is set beside."""
+
+    gap_before_n: float
+    effects: tuple[str, ...] = ()
+    reality: Any = None
+    mended: Any = None
+
+
+def test_the_mended_run_presses_where_the_first_one_did(monkeypatch, recording):
+    """The gap that is measured stands beside the one that was said only if both are of the same presses: what
+    is cheap as documented and dear at its best is run over as many as the dear one."""
+    asked = []
+
+    def simulator(name, settings, numbers, model):
+        adapter = SimpleNamespace(
+            presses=12 if settings == "best" else None, cannot=(), stated={}, version="1"
+        )
+        adapter.advice, adapter.poisson_limit = {}, np.inf
+        return SimpleNamespace(name=name, adapter=adapter, model=model, settings=settings)
+
+    def run_along(made, recording, progress, *, most):
+        asked.append((made.settings, most))
+        chosen = np.ones(3, dtype=bool)
+        return Ran(recording.force_on_tool, chosen, made.adapter, f"settings {made.settings}")
+
+    def judged(recording, model, asked, options, progress, **rules):
+        return _Gap(0.1 if "documented" in asked.run_as else 0.03, ("mesh_stiffness",))
+
+    monkeypatch.setattr(diagnose, "simulator", simulator)
+    monkeypatch.setattr(diagnose, "run_along", run_along)
+    monkeypatch.setattr("diagnose.other_simulator.pipeline.diagnose_simulated", judged)
+    monkeypatch.setattr("reconstruct.presses_on_model.presses_on", lambda recording, model: model.presses)
+    block = shapes.model(shapes.block((0.06, 0.06, 0.03), (2, 2, 1)))
+    found = pp.diagnose(recording, block, renderer="scikit-fem", mended="best", progress=False)
+    assert asked == [("documented", 12), ("best", 12)]
+    assert found.gap_before_n == 0.1 and found.mended.gap_n == 0.03
+    assert found.mended.settings == "settings best" and found.mended.effects == ("mesh_stiffness",)
+    asked.clear()
+    pp.diagnose(recording, block, renderer="scikit-fem", mended="best", presses=7, progress=False)
+    assert asked == [("documented", 7), ("best", 7)]
 
 
 @pytest.mark.slow
