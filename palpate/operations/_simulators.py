@@ -6,6 +6,7 @@ import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from diagnose.forward.touches import LEAST_PRESSES
+from mechanics.errors import OptionError
 from mechanics.key_values import pairs, words_of
 from palpate.operations._declare import operand
 from render.options import DOCUMENTED, SETTINGS, RenderOptions
@@ -52,12 +53,14 @@ def told(whole_s: float, presses: int) -> str:
 
 class Ran(NamedTuple):
     """What a simulator gave: force (n, 3) N on the tool at every row of the recording, zeros where it was not
-    run; over which (p,) of the recording's presses; of which adapter; its settings in words."""
+    run; over which (p,) of the recording's presses; of which adapter; its settings in words; which presses
+    ended without an answer."""
 
     force: np.ndarray
     chosen: np.ndarray
     adapter: Adapter
     said: str
+    notes: tuple[str, ...] = ()
 
 
 def mended(settings: str, numbers: str, by: str) -> tuple[str, str]:
@@ -84,8 +87,8 @@ def fewest(made: Sequence[SimulatorRenderer]) -> int | None:
 def run_along(
     made: SimulatorRenderer, recording: Recording, progress: Progress, *, most: int | None = None
 ) -> Ran:
-    """Run a simulator along a recording's presses, `most` of them, spread over its places (None: all). Raises
-    OptionError where it finds no answer."""
+    """Run a simulator along a recording's presses, `most` of them, spread over its places (None: all). One
+    for which it finds no answer is left out, and said; raises OptionError where that leaves too few."""
     from diagnose.other_simulator.presses_to_run import spread_out
     from reconstruct.presses_on_model import presses_on
     from render.replay import replay_touches
@@ -94,14 +97,24 @@ def run_along(
     numbers = f", {options.simulator_set}" if options.simulator_set else ""
     said = f"settings {options.simulator_settings}{numbers}"
     presses = presses_on(recording, made.model)
-    chosen = spread_out(presses, most)
+    asked = spread_out(presses, most)
+    chosen, errors = asked.copy(), []
+
+    def failed(number: int, error: OptionError) -> None:
+        chosen[number] = False
+        errors.append(error)
+        if chosen.sum() < min(LEAST_PRESSES, asked.sum()):
+            raise error
 
     begun, estimate = time.monotonic(), ""
 
     def tell(words: str, share: float) -> None:
         nonlocal estimate
         if not estimate and share > TOLD_FROM:
-            estimate = ", " + told((time.monotonic() - begun) / share, int(chosen.sum()))
+            estimate = ", " + told((time.monotonic() - begun) / share, int(asked.sum()))
         progress(f"{made.name}, {said}: {words}{estimate}", share)
 
-    return Ran(replay_touches(made, recording, presses, chosen, tell), chosen, made.adapter, said)
+    force = replay_touches(made, recording, presses, asked, tell, failed)
+    without = f"{len(errors)} of {asked.sum()} presses ended without an answer and are left out"
+    notes = (f"{said}: {without}: {errors[0]}",) if errors else ()
+    return Ran(force, chosen, made.adapter, said, notes)

@@ -49,10 +49,10 @@ from render.registry import check_settings
 if TYPE_CHECKING:
     from diagnose.other_simulator.result import SimulatedGap
     from diagnose.verdict.result import Diagnosis
+    from mechanics.model.model import Model
     from mechanics.progress import Progress
     from mechanics.recording.recording import Recording
     from palpate.operations._shared import ModelLike, RecordingLike
-    from render.simulators.base import SimulatorRenderer
 
 
 @dataclass(frozen=True)
@@ -192,19 +192,15 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
         if forces is not None:
             simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
             return diagnose_simulated(measured, made, simulation, options, rest, **rules)
-        assert asked.renderer is not None
         told = part(tell, begun, 1.0)
-        runs = [simulator(asked.renderer, *each, made) for each in _settings(asked)]
-        most = asked.presses or fewest(runs)
-        simulation = _simulation(asked, call, measured, runs[0], most, part(told, 0.0, 0.4))
-        found = diagnose_simulated(measured, made, simulation, options, part(told, 0.4, 0.8), **rules)
-        if asked.mended is None:
-            return found
-        again = _simulation(asked, call, measured, runs[1], most, part(told, 0.8, 0.95))
-        left = diagnose_simulated(
-            measured, made, again, options, part(told, 0.95, 1.0), reality=found.reality, **rules
-        )
-        return replace(found, mended=Mended(again.run_as, left.gap_before_n, left.effects))
+        simulations = _simulations(asked, call, measured, made, part(told, 0.0, 0.5))
+        found = diagnose_simulated(measured, made, simulations[0], options, part(told, 0.5, 0.9), **rules)
+        for again in simulations[1:]:
+            left = diagnose_simulated(
+                measured, made, again, options, part(told, 0.9, 1.0), reality=found.reality, **rules
+            )
+            found = replace(found, mended=Mended(again.run_as, left.gap_before_n, left.effects))
+        return found
 
 
 def _settings(asked: DiagnoseOperands) -> list[tuple[str, str]]:
@@ -214,32 +210,42 @@ def _settings(asked: DiagnoseOperands) -> list[tuple[str, str]]:
     return runs if asked.mended is None else [*runs, mended(settings, numbers, asked.mended)]
 
 
-def _simulation(
-    asked: DiagnoseOperands,
-    call: Call,
-    measured: Recording,
-    made: SimulatorRenderer,
-    most: int | None,
-    tell: Progress,
-) -> Any:
-    """A simulator that is run along the recorded path; and what it says of itself."""
+def _simulations(
+    asked: DiagnoseOperands, call: Call, measured: Recording, model: Model, tell: Progress
+) -> list[Any]:
+    """What --renderer gave along the recorded path as asked, then mended, over the same presses; and what it
+    says of itself."""
+    import numpy as np
+
     from diagnose.other_simulator.forces import Forces
     from diagnose.other_simulator.pipeline import Asked
     from diagnose.other_simulator.stated import stated_of, stated_values
 
-    ran = run_along(made, measured, tell, most=most)
-    run, there = int(ran.chosen.sum()), len(ran.chosen)
-    some = f", spread over its places (--presses {there}: all)" if run < there else ""
-    notes = (
-        f"run here along {run} of the {there} recorded presses{some}: {ran.said}",
-        *(f"it cannot say: {x}" for x in ran.adapter.cannot),
-    )
-    forces = Forces(measured.t, ran.force, made.name, notes, ran.chosen)
-    # what the adapter gave it, but for what is said
-    stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, made.model)
-    own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
-    of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
-    return Asked(forces, stated, own_clock, *of_adapter)
+    assert asked.renderer is not None
+    made = [simulator(asked.renderer, *each, model) for each in _settings(asked)]
+    most = asked.presses or fewest(made)
+    share = 1 / len(made)
+    runs = [
+        run_along(each, measured, part(tell, k * share, (k + 1) * share), most=most)
+        for k, each in enumerate(made)
+    ]
+    chosen = np.logical_and.reduce([ran.chosen for ran in runs])
+    along, there = int(chosen.sum()), len(chosen)
+    some = f", spread over its places (--presses {there}: all)" if along < there else ""
+    simulations = []
+    for ran in runs:
+        notes = (
+            f"run here along {along} of the {there} recorded presses{some}: {ran.said}",
+            *(note for each in runs for note in each.notes),
+            *(f"it cannot say: {x}" for x in ran.adapter.cannot),
+        )
+        forces = Forces(measured.t, ran.force, asked.renderer, notes, chosen)
+        # what the adapter gave it, but for what is said
+        stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
+        of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
+        own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
+        simulations.append(Asked(forces, stated, own_clock, *of_adapter))
+    return simulations
 
 
 def _forces(asked: DiagnoseOperands) -> Any:
