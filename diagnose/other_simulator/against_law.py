@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.numerics.base import NumericalEffect, Signal
 from diagnose.numerics.registry import numericals
 from diagnose.options import AttributionOptions, NuisanceOptions
@@ -210,7 +211,7 @@ def _held_out(
     return law, together, added
 
 
-def _predicted(forward: StatedForward, found: Fit, names: Sequence[str] = ()) -> np.ndarray:
+def _predicted(forward: Forward, found: Fit, names: Sequence[str] = ()) -> np.ndarray:
     """(n, 3) N of our law with these of a fit's effects; its first touches go with them, not with the law."""
     effects = tuple(e for e in found.effects if e.role is Role.KNOWN or e.name in names)
     values = np.concatenate([found.values[:1], *(found.of(e.name) for e in effects)])
