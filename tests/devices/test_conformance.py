@@ -202,7 +202,7 @@ def test_unplugging_and_coming_back(bench: Bench) -> None:
         device.enable_force()
     with Pusher(device, PUSH) if forceful else threading.Lock():
         if forceful:
-            assert eventually(lambda: bench.felt().any())
+            assert eventually(lambda: pushes(bench).any())
         last = device.read().sequence
         bench.unplug()
         assert eventually(lambda: not device.read().connected)
@@ -222,7 +222,7 @@ def test_unplugging_and_coming_back(bench: Bench) -> None:
             assert eventually(lambda: (bench.move(PLACE), device.read().sequence > seen + 30)[1])
             assert not bench.felt().any(), "force returned without being enabled again"
             device.enable_force()
-            assert eventually(lambda: bench.felt().any())
+            assert eventually(lambda: pushes(bench).any())
 
 
 def test_ramp_in_after_enable(forceful: Bench) -> None:

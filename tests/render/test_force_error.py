@@ -17,12 +17,11 @@ def test_the_law_is_surer_on_flat_ground_than_deep_on_a_bump_or_beside_a_rim():
 
 def test_the_law_is_less_sure_of_a_compressible_solid_and_of_a_deep_slippery_tip():
     flat, squeezed = (float(law_share(1.0, 0, 0, 0, 0, poisson_ratio=nu)) for nu in (0.49, 0.35))
-    assert squeezed > 2 * flat
-    shallow, deep, rough = (
-        float(law_share(x, 0, 0, 0, 0, friction=mu)) for x, mu in ((0.2, 0.1), (2.0, 0.1), (2.0, 1.0))
+    assert squeezed > 1.4 * flat
+    shallow, deep, slippery = (
+        float(law_share(x, 0, 0, 0, 0, friction=mu)) for x, mu in ((0.2, 1.0), (2.0, 1.0), (2.0, 0.05))
     )
-    assert deep > 2 * shallow
-    assert rough == pytest.approx(flat, rel=1e-2)
+    assert deep > 1.5 * shallow and slippery > 1.1 * deep
 
 
 def test_error_grows_with_the_force_and_is_told_in_its_three_parts(block_renderer):
