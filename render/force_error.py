@@ -1,8 +1,8 @@
 """What a rendered force may be off by: the law itself, the felt shape, where the first touch lay.
 
 Half widths of 95 % intervals, N. The law's own share of the force was fitted to solved presses at places of
-known shapes (benchmarks.law_bound): it grows with the depth, on curved ground, beside rims and above the base,
-and where a push along the normal also moves the surface sideways.
+known shapes (benchmarks.law_bound): it grows with the depth, on curved ground, beside rims and above the
+base, and where a push along the normal also moves the surface sideways.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from render.surface.snapping import ONSET_NOISE_M
 FLOOR, DEEP_SHARE, BENT_SHARE, SIDEWAYS_SHARE = 0.02, 0.02, 0.03, 0.1
 RIM_SHARE, BASE_SHARE = 0.2, 0.3
 RATIO_SHARE, SLIP_SHARE, SLIPPERY = 0.25, 0.03, 0.15
-"""Floor; then by a tip radius of depth, by |curvature| times depth, by the surface's way sideways, by how near
-a rim and the base; by Poisson's ratio below the usual one; by slip, a tip radius deep, which fades by that
-coefficient. Of 317 presses at 32 places of eight shapes (`bench law-bound`, seed 41) 4 % lie beyond, deep above
-a base and at the lip of a waist, where the law is 12 % too soft. At 0.3 mm from a block's rim it is 18 % too
-soft a tenth of a radius deep."""
+"""Floor; then by a tip radius of depth, by |curvature| times depth, by the surface's way sideways, by how
+near a rim and the base; by Poisson's ratio below the usual one; by slip, a tip radius deep, which fades by
+that coefficient. Of 317 presses at 32 places of eight shapes (`bench law-bound`, seed 41) 4 % lie beyond,
+deep above a base and at the lip of a waist, where the law is 12 % too soft. At 0.3 mm from a block's rim it
+is 18 % too soft a tenth of a radius deep."""
 _SURE = 1.96
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
