@@ -105,17 +105,28 @@ def measured(
 
 def forces(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(places, depths) N along the normal, straight presses from outside to each depth below the points."""
-    model = Model(
-        mesh=mesh.quadratic(), material=Material(MODULUS_PA, NU), support=Support(np.zeros(3), _UP),
-        tool=Tool(TIP_M), mesh_size_m=0.01,
+    renderer = FemRenderer(standing(mesh), compliance=own_compliance_near(mesh, points))
+    return straight_in(renderer, points, normals, np.array(DEPTHS_M))
+
+
+def standing(mesh: TetMesh, nu: float = NU, dent_law: str = "linear") -> Model:
+    """The model of a mesh that stands on z = 0."""
+    return Model(
+        mesh=mesh.quadratic(), material=Material(MODULUS_PA, nu, dent_law=dent_law),
+        support=Support(np.zeros(3), _UP), tool=Tool(TIP_M), mesh_size_m=0.01,
     )  # fmt: skip
-    renderer = FemRenderer(model, compliance=own_compliance_near(mesh, points))
-    way = np.linspace(-0.002, max(DEPTHS_M), 81)
-    result = np.empty((len(points), len(DEPTHS_M)))
+
+
+def straight_in(
+    renderer: FemRenderer, points: np.ndarray, normals: np.ndarray, depths_m: np.ndarray
+) -> np.ndarray:
+    """(places, depths) N along the normal as rendered, the tip coming from outside."""
+    way = np.linspace(-0.002, depths_m[-1], 101)
+    result = np.empty((len(points), len(depths_m)))
     for row, point, normal in zip(result, points, normals, strict=True):
         path = point + (TIP_M - way)[:, None] * normal
         force = renderer.follow(renderer.start([TIP_M]), path[:, None], np.full(len(way), 10.0))[:, 0]
-        row[:] = np.interp(DEPTHS_M, way, force @ normal)
+        row[:] = np.interp(depths_m, way, force @ normal)
     return result
 
 

@@ -11,35 +11,26 @@ Solved presses are kept in the user's cache.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from benchmarks._known_shapes import SHAPES, KnownShape
+from benchmarks._pressed_places import FINENESS, in_laboratory, kept_force, rendered
 from benchmarks.evidence import Figure
-from benchmarks.felt_surface import NU, TIP_M, meshed, own_compliance_near
+from benchmarks.felt_surface import NU, TIP_M, meshed
 from benchmarks.timing import table
 from mechanics.disk.store import content_key
-from mechanics.disk.writing import atomic_file
-from mechanics.errors import PalpateError
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
 from mechanics.press_solver.press import PressOptions, PressSolver
 from mechanics.shape.tetmesh import TetMesh
 from palpate.output import progress_bar
-from render.fem.renderer import FemRenderer
-from render.force_error import law_share, place_numbers
-from scenes.laboratory.mesh import laboratory_cache
-from scenes.laboratory.specimen import Fineness, Specimen, build
-from scenes.laboratory.surface import Surface
-from scenes.phantoms import Phantom
+from render.force_error import law_share
+from scenes.laboratory.specimen import Fineness
 
 DEPTHS_M = 1e-3 * np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
 BANDS_MM = ((1, 2), (2, 4), (4, 6), (6, 8))
-FINENESS, SHALLOW, SHALLOW_M = Fineness(2.0, 6.0, 0.5), Fineness(1.3, 4.0, 0.35), 2e-3
-"""Of the laboratory, and down to that depth: in the middle of the block the finer one is 0.7 to 0.9 % harder
+SHALLOW, SHALLOW_M = Fineness(1.3, 4.0, 0.35), 2e-3
+"""Of the laboratory down to that depth: in the middle of the block the finer one is 0.7 to 0.9 % harder
 from 1 to 2 mm, at most 0.25 % from 3 mm on. Its penalty takes another 0.5 % off at 1 mm, by estimate."""
 
 
@@ -61,11 +52,11 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         shape = SHAPES[name]()
         points, normals = shape.places(arguments.places, arguments.seed)
         mesh = meshed(shape, 1e-3 * arguments.size_mm)
-        solve = Laboratory(shape, progress) if arguments.truth == "laboratory" else OwnSolver(shape, mesh)
+        solve = Laboratory(shape) if arguments.truth == "laboratory" else OwnSolver(shape, mesh)
         truth = np.array([_solved(solve, *place) for place in zip(points, normals, strict=True)])
         progress("places", (k + 1) / len(arguments.shapes))
         for tag, bent in (("without", False), ("law", True)):
-            force, numbers = _rendered(mesh, points, normals, bent)
+            force, numbers = rendered(mesh, points, normals, DEPTHS_M, bent=bent)
             error = 100 * (force / truth - 1)
             found[f"{name}, {tag}"] = {"points_m": points, "error_percent": error, "place": numbers}
             rows.append([name, tag, *(_band(error, low, high) for low, high in BANDS_MM), *_whole(error)])
@@ -117,8 +108,8 @@ class Laboratory:
 
     name = "law by place 1"
 
-    def __init__(self, shape: KnownShape, progress: Any, fineness: Fineness = FINENESS) -> None:
-        self.shape, self._progress, self._fineness = shape, progress, fineness
+    def __init__(self, shape: KnownShape, fineness: Fineness = FINENESS) -> None:
+        self.shape, self._fineness = shape, fineness
 
     @property
     def made_of(self) -> str:
@@ -127,24 +118,13 @@ class Laboratory:
 
     def finer(self) -> Laboratory:
         """One for shallow touches."""
-        return Laboratory(self.shape, self._progress, SHALLOW)
+        return Laboratory(self.shape, SHALLOW)
 
     def __call__(self, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """(depths,) m^2: normal force over the modulus; NaN from where it finds no equilibrium."""
-        shape, progress = self.shape, self._progress
-        thing = Phantom(shape.name, shape.name, shape.vertices, shape.triangles, 1.0, NU)
-        at = Surface(1e3 * shape.vertices, shape.triangles).nearest(1e3 * point)[0][0]
-        radius, force = 1e3 * TIP_M, np.full(len(DEPTHS_M), np.nan)
-        specimen = Specimen(finite=True, tip_radius=radius)
-        problem = build(thing, specimen, at, travel=0.0, fineness=self._fineness)
-        state = problem.rest(at + radius * normal)
         deepest = DEPTHS_M[-1] if self._fineness is FINENESS else SHALLOW_M
-        try:
-            for k, depth in enumerate(DEPTHS_M[DEPTHS_M <= deepest]):
-                state = problem.advance(state, at + (radius - 1e3 * depth) * normal)
-                force[k] = 1e-6 * state.force @ normal
-        except PalpateError as error:
-            progress.note(f"{shape.name}: {error}") if hasattr(progress, "note") else None
+        depths, force = DEPTHS_M[DEPTHS_M <= deepest], np.full(len(DEPTHS_M), np.nan)
+        force[: len(depths)] = in_laboratory(self.shape, point, normal, depths, fineness=self._fineness)
         return force
 
 
@@ -180,39 +160,3 @@ def _kept(solve: Laboratory | OwnSolver, point: np.ndarray, normal: np.ndarray) 
     shape = solve.shape
     key = content_key(solve.name, shape.vertices, shape.triangles, point, normal, DEPTHS_M, solve.made_of)
     return kept_force(key, lambda: solve(point, normal))
-
-
-def kept_force(key: str, solve: Callable[[], np.ndarray]) -> np.ndarray:
-    """(d,) m^2 what `solve` answers, from the user's cache where it is there under its content key."""
-    path = laboratory_cache() / "presses" / f"{key}.npy"
-    if path.is_file():
-        return np.load(path)
-    force = solve()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_file(path) as temporary, temporary.open("wb") as handle:
-        np.save(handle, force)
-    return force
-
-
-def _rendered(
-    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, bent: bool
-) -> tuple[np.ndarray, np.ndarray]:
-    """(places, depths) m^2: normal force over the modulus as rendered; (4, places) render.force_error."""
-    model = Model(
-        mesh=mesh.quadratic(),
-        material=Material(1e4, NU, dent_law="neo-hookean"),
-        support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
-        tool=Tool(TIP_M),
-        mesh_size_m=0.01,
-    )
-    renderer = FemRenderer(model, compliance=own_compliance_near(mesh, points))
-    if not bent:
-        renderer.parameters.table[:, 3] = 0.0
-    way = np.linspace(-0.002, DEPTHS_M[-1], 101)
-    result = np.empty((len(points), len(DEPTHS_M)))
-    for row, point, normal in zip(result, points, normals, strict=True):
-        path = point + (TIP_M - way)[:, None] * normal
-        force = renderer.follow(renderer.start([TIP_M]), path[:, None], np.full(len(way), 10.0))[:, 0]
-        row[:] = np.interp(DEPTHS_M, way, force @ normal) / model.material.young_modulus_pa
-    near = cKDTree(renderer.contact.arrays.vertices).query(points)[1]
-    return result, place_numbers(renderer, TIP_M, near)

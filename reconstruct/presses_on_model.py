@@ -11,6 +11,7 @@ from mechanics.recording.recording import Recording
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.steps.s1_filter.signals import stated_tracing
+from reconstruct.steps.s2_base.boundary import Boundary
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s3_contacts.left_out import off_surface, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
@@ -62,14 +63,24 @@ def check_near(recording: Recording, model: Model) -> None:
 
 
 def _found(recording: Recording, model: Model) -> Presses:
-    if not is_points(recording) and not stated_geometry(recording, GeometryOptions()).known:
-        try:
-            return explore(recording, contact_options=_ANY).presses
-        except ContactError:
-            if stated_tracing(recording) is not None:
-                raise  # else slides of the object may have passed for a tracing that never was
     base = base_of_model(model, recording.tip_radius_m)
     if is_points(recording):
         return explore_points(recording, base, _ANY).presses
+    if not stated_geometry(recording, GeometryOptions()).known:
+        try:
+            found = explore(recording, contact_options=_ANY)
+        except ContactError:
+            if stated_tracing(recording) is not None:
+                raise  # else slides of the object may have passed for a tracing that never was
+        else:
+            if stated_tracing(recording) is not None or _traces(found.boundary, model):
+                return found.presses
     found = explore(recording, contact_options=_ANY, boundary=base, unbroken=True)
     return without_slides(found, _ANY.least_palpations).presses
+
+
+def _traces(boundary: Boundary, model: Model) -> bool:
+    """Whether what was taken for a tracing of the base lies on the plane that the model stands on: slides of
+    the object, which a recording without phase I begins with, lie elsewhere."""
+    off = (boundary.outline - model.support.point) @ model.support.normal
+    return float(np.median(np.abs(off))) < model.tool.tip_radius_m

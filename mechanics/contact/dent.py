@@ -5,7 +5,8 @@ Every law is a table over x = delta / R of four numbers, with E* = E / (1 - nu^2
     contact radius      R alpha(x) x^0.5
     sideways stiffness  8 G / (2 - nu) R tau(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) where tau =
     alpha)
-Hertz is c = 4/3, alpha = tau = 1, g = 0. On a curved surface R is the effective radius, which is Hertz's
+Hertz is c = 4/3, alpha = tau = 1, g = 0. A tip that slips is pushed back less, the deeper the more: c falls
+with Coulomb's friction (`slipping`). On a curved surface R is the effective radius, which is Hertz's
 answer for a small contact; g is what a deep one on a bump or in a hollow has beyond it. One numba kernel
 reads them all, so a new law is a new table.
 """
@@ -18,6 +19,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from mechanics.errors import OptionError
 from mechanics.kernels import kernel
@@ -32,6 +34,10 @@ _RATIOS = {
     "neo-hookean": (0.40, USUAL_POISSON_RATIO),
 }
 """Poisson's ratios that a sticking law is tabulated for; straight lines between and beyond."""
+
+
+GRIPS = 0.7
+"""Coulomb's friction from which a tip that goes straight in sticks."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +69,50 @@ class DentLaw:
 
 
 @lru_cache(maxsize=64)
-def dent_law(name: str, poisson_ratio: float = USUAL_POISSON_RATIO) -> DentLaw:
-    """The law of that name for that Poisson's ratio; raises OptionError for an unknown one."""
+def dent_law(
+    name: str, poisson_ratio: float = USUAL_POISSON_RATIO, friction: float = float("inf")
+) -> DentLaw:
+    """The law of that name for that Poisson's ratio and Coulomb's friction; raises OptionError for an unknown
+    one."""
     if name not in _LAWS:
         raise OptionError(f"'{name}' is no dent law; allowed are {', '.join(_LAWS)}")
     table, source = _LAWS[name](poisson_ratio)
-    bent = _beyond_hertz() if name in _FOLLOWED else np.zeros(len(table))
+    bent = np.zeros(len(table))
+    if name in _FOLLOWED:
+        bent = _beyond_hertz()
+        table[:, 0] *= slipping(name, poisson_ratio, friction)
     table = np.column_stack([table, bent])
     table.setflags(write=False)
     return DentLaw(name, table, source)
+
+
+def slipping(name: str, poisson_ratio: float, friction: float) -> np.ndarray:
+    """(n,) of `grid()`: normal force of a tip that slips over that of one that sticks, going straight in.
+
+    From finite elements, neo-Hookean (tools.dent_slip); linear, where a surface that slips deep runs through
+    itself, as much of the way to Sneddon's frictionless sphere.
+    """
+    if friction >= GRIPS:
+        return np.ones(_STEPS + 1)
+    ratios, frictions, shares = _slip_shares()
+    between = np.clip((poisson_ratio - ratios[0]) / (ratios[1] - ratios[0]), 0.0, 1.0)
+    share = (1 - between) * shares[0] + between * shares[1]
+    kept = PchipInterpolator(np.append(frictions, GRIPS), np.vstack([share, np.ones(_STEPS + 1)]))(friction)
+    if name != "linear":
+        return kept
+    slips = (1 - kept) / np.maximum(1 - share[0], 1e-9)
+    return 1 - slips * np.maximum(1 - _sphere()[0][:, 0] / _tabulated(name, poisson_ratio)[0][:, 0], 0.0)
+
+
+@lru_cache(maxsize=1)
+def _slip_shares() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Poisson's ratios (2,), frictions (m,), and the shares (2, m, n) of the force that they leave; deeper
+    than was solved the last holds."""
+    head, *rows = np.loadtxt(Path(__file__).with_name("dent_slip.csv"), delimiter=",")
+    ratios, frictions = np.unique([row[0] for row in rows]), np.unique([row[1] for row in rows])
+    depths = np.append(0.0, head[2:])
+    shares = [np.interp(grid(), depths, np.append(1.0, row[2:])) for row in rows]
+    return ratios, frictions, np.reshape(shares, (len(ratios), len(frictions), -1))
 
 
 def dent_laws() -> tuple[str, ...]:

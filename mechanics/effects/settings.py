@@ -31,8 +31,8 @@ class Touch:
     numbers: dict[Law, np.ndarray] = field(default_factory=dict)
 
     def law_of_dent(self, poisson_ratio: float) -> DentLaw:
-        """The dent's law with all factors."""
-        law = dent_law(self.dent_law, poisson_ratio)
+        """The dent's law at this friction, with all factors."""
+        law = dent_law(self.dent_law, poisson_ratio, self.friction)
         for factor in self.factors:
             law = law.scaled(*factor(poisson_ratio))
         return law

@@ -94,7 +94,10 @@ class Settling:
         trial.relative = before.relative
         few = np.unique(self._of_face[chosen])
         few = few[few >= 0]
-        small = self._onto(schur, few)
+        try:
+            small = self._onto(schur, few)
+        except la.LinAlgError:
+            return None  # the body's tangent is no valley here; one of a shorter step may be
         pull = small.pull(load)
         local = np.full(len(u) + 1, -1)
         local[few] = np.arange(len(few))

@@ -82,6 +82,13 @@ class FemRenderer(Renderer):
         changed.model = self.model.with_modulus(float(young_modulus_pa))
         return changed
 
+    def with_friction(self, friction: float) -> FemRenderer:
+        changed = super().with_friction(friction)
+        touch = rendered_touch(self.model, replace(self.options, friction=float(friction)))
+        table = np.array(touch.law_of_dent(self.model.material.poisson_ratio).table)
+        changed.parameters = changed.parameters._replace(table=table)
+        return changed
+
     def with_field(self, far: np.ndarray, blocks: np.ndarray | None = None) -> FemRenderer:
         """The same renderer with another far field (v, 3, 3), mutual table (t, t, 3, 3), 1/m, unit modulus.
 

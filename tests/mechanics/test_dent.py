@@ -112,3 +112,20 @@ def test_axisymmetric_solution_meets_punches_and_the_tables():
         known = dent_force(dent_law(law, nu).table, x, 1.0, 0.0, 1.0)[0]
         assert force == pytest.approx(known, rel=0.02)
         assert plane_strain_modulus(1.0, NU) > 1
+
+
+def test_a_tip_that_slips_is_pushed_back_less_the_deeper_it_goes():
+    deep = R * np.array([0.25, 1.0, 2.0])
+    for name in ("linear", "neo-hookean"):
+        held, *slips = (dent_law(name, NU, mu).force(deep, E, NU, R) for mu in (np.inf, 0.7, 0.3, 0.1, 0.0))
+        shares = np.array(slips) / held
+        assert (np.diff(shares, axis=0) <= 0).all() and (np.diff(shares, axis=1) <= 0).all()
+        assert shares[0] == pytest.approx(1.0)
+    assert shares[2, 2] == pytest.approx(0.90, abs=0.02)
+
+
+def test_without_friction_and_strain_the_dent_is_sneddons():
+    depth = R * np.array([0.2, 0.6, 1.4])
+    for nu in (0.40, NU):
+        free = dent_law("linear", nu, 0.0).force(depth, E, nu, R)
+        assert free == pytest.approx(dent_law("sphere").force(depth, E, nu, R), rel=2e-3)

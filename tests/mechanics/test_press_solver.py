@@ -5,6 +5,7 @@ import pytest
 
 from mechanics.contact.dent import dent_law
 from mechanics.errors import OptionError
+from mechanics.press_solver import settling
 from mechanics.press_solver.curved_faces import FeltSurface
 from mechanics.press_solver.even_surface import even_surface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
@@ -206,3 +207,20 @@ def test_a_slippery_tip_goes_deep_with_less_force_than_one_that_sticks():
     ]
     assert np.isfinite(forces).all()
     assert (np.diff(forces, axis=0)[:, 1:] > 0).all()
+
+
+def test_a_tangent_that_is_no_valley_costs_a_shorter_step(monkeypatch):
+    """It ended a deep press of a thin plate, and the run of all others with it."""
+    solver, depths = half_space(finest=0.9, growth=1.3, zone=3.5), np.array([1e-3, 2e-3])
+    usual = solver.press(TOP, UP, depths).force
+    condensed, calls = settling.Condensed, []
+
+    def sometimes(dense, few):
+        calls.append(len(few))
+        if len(calls) == 2:
+            raise np.linalg.LinAlgError("not positive definite")
+        return condensed(dense, few)
+
+    monkeypatch.setattr(settling, "Condensed", sometimes)
+    assert solver.press(TOP, UP, depths).force[:, 2] == pytest.approx(usual[:, 2], rel=2e-3)
+    assert len(calls) > 2

@@ -62,6 +62,8 @@ def responses(renderer: Renderer, depths_m: np.ndarray) -> Responses:
     """The finite-element renderer's table at every vertex of its surface; those that cannot be pressed have
     that of the nearest one that can."""
     sticky, arrays = renderer.with_friction(np.inf), renderer.contact.arrays
+    # what slip takes off the dent stays; the page holds the sideways force on Coulomb's cone by itself
+    sticky.parameters = sticky.parameters._replace(table=renderer.parameters.table)
     vertices, bends = _pressable(renderer), _bends(renderer)
     middle = arrays.normals[bends].sum(axis=1)
     middle /= np.linalg.norm(middle, axis=1, keepdims=True)
