@@ -14,7 +14,8 @@ parameters wrong, over a control that is as resolved as can be afforded. A flaw 
 advice mends the setting that was changed (an element's size: mesh stiffness or contact nodes). What the
 control is named for is the simulator's own: it counts as a false alarm where the control's force is within
 5 % of our law (rms), or where a parameter is named; else it is true, and is left out of what is asked of the
-planted ones, unless a planted one is called the same. Shrinkage is then not asked.
+planted ones, unless a planted one is called the same. Shrinkage is then not asked: what is said is the gap
+without any of that flaw, and the control has some of it.
 """
 
 from __future__ import annotations
@@ -204,7 +205,7 @@ def _adapter_row(
     named = _named(verdict)
     off = rms(control - runs.law) / rms(runs.law)
     right = {flaw.name: list(flaw.right) for flaw, _ in planted}
-    at = [n for n in named if n in right.get(largest, []) and n not in own]
+    at = [n for n in named if n in right.get(largest, []) and not {*own} & {*right[largest]}]
     known = {e.name: e.gap_after_n for e in verdict.entries}
     limits = {e.name: e.detectable_n for e in verdict.entries if np.isfinite(e.detectable_n)}
     seen = [limits[n] for n in right.get(largest, []) if n in limits]

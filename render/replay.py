@@ -22,6 +22,8 @@ from render.force_error import error_figures, force_errors
 from render.scene import TouchScene, scene_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from render.exact import ExactReplay
 
 FORCES = Kind("a file of palpate replay", (b"t,fx,fy,fz",))
@@ -73,15 +75,20 @@ def replay_touches(
     presses: Presses,
     chosen: np.ndarray,
     progress: Progress = silent,
+    failed: Callable[[int, OptionError], None] | None = None,
 ) -> np.ndarray:
     """`replay` over the chosen (p,) presses of a recording alone, each from shortly before its first touch to
-    shortly after its loss, and by itself: (n, 3) N at the recording's rows, zeros elsewhere."""
+    shortly after its loss, and by itself: (n, 3) N at the recording's rows, zeros elsewhere.
+
+    failed(press, error): called where a simulator finds no answer, whose press then has zeros; None: raised.
+    """
     scene, t = scene_of(touched), recording.t
     forces = np.zeros((len(t), 3))
     before = np.concatenate([[-np.inf], presses.end_s[:-1]])
+    numbers = np.flatnonzero(chosen)
     parts = [
         slice(*np.searchsorted(t, [max(presses.onset_s[p] - LEAD_S, before[p]), presses.end_s[p] + LEAD_S]))
-        for p in np.flatnonzero(chosen)
+        for p in numbers
     ]
     whole, done, left = sum(part.stop - part.start for part in parts), 0, Remaining()
     left.tell(0.0)
@@ -93,7 +100,15 @@ def replay_touches(
             if first == own.start:
                 state = scene.start([recording.tip_radius_m])
             steps = np.diff(t[rows], prepend=t[rows.start - 1] if rows.start else t[0] - 1e-3)
-            forces[rows] = scene.follow(state, np.array(recording.position[rows, None]), steps)[:, 0]
+            try:
+                forces[rows] = scene.follow(state, np.array(recording.position[rows, None]), steps)[:, 0]
+            except OptionError as error:
+                if failed is None:
+                    raise
+                failed(int(numbers[k - 1]), error)
+                forces[own] = 0.0
+                done += own.stop - first
+                break
             done += rows.stop - rows.start
             left.tell(done / whole)
             words = ", ".join(word for word in (f"press {k} of {len(parts)}", left.words()) if word)

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.numerics.base import NumericalEffect, Signal
 from diagnose.numerics.registry import numericals
 from diagnose.options import AttributionOptions, NuisanceOptions
@@ -45,8 +46,8 @@ class Numerics:
 
     By name: keys of every effect that was looked at; intervals at 95 %; probability, gain, confidence_set_p;
     detectable_n, N rms from which these presses show it at all; values, of its parameters, where it is named;
-    force, the (n, 3) N that it adds to the law's
-    force, of a fit that has not seen the place ("all": of those named together). law: (n, 3) N, our law at
+    force, the (n, 3) N that it adds: of those named to the law with the others, of the others to the law
+    alone, of a fit that has not seen the place ("all": of those named together). law: (n, 3) N, our law at
     the stated parameters; with_numerics: with what was named; local frames. strain: finite strain, where the
     simulator has it. remainder: something is left that nothing here explains. reasons: in words."""
 
@@ -93,18 +94,14 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
     counts = search.whitener.counts()
     kept = never_worse(names, plain, after, counts, search.whitener.explained)
     best = _with(search, found, kept.names)
-    law, together = _held_out(search, best.found)
-    force = {"all": together - law}
+    law, together, added = _held_out(search, best.found, kept.names)
+    force = {"all": together - law, **added}
     keys, intervals, probability, gain = {}, {}, {}, {}
     rng = np.random.default_rng(0)
     for name, score in found.scores.items():
         fitted = best.found if name in kept.names else score.candidate.found
-        if name in kept.names and len(kept.names) == 1:
-            force[name] = force["all"]
-        else:
-            # an effect alone, on the law: what mending it alone would take away
-            alone, with_it = _held_out(search, score.candidate.found, folds=name in kept.names)
-            force[name] = with_it - alone
+        if name not in kept.names:
+            force[name] = _predicted(forward, fitted, [name]) - _predicted(forward, fitted)
         keys[name] = score.effect.report(fitted.of(name), forward, fitted.modulus)
         intervals[name] = parameter_intervals(fitted, name, forward, search.dof, rng)
         probability[name] = (
@@ -193,21 +190,33 @@ def _without(search: Search, found: Fit, fold: np.ndarray) -> Fit:
     )
 
 
-def _held_out(search: Search, found: Fit, *, folds: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """((n, 3) N our law alone, (n, 3) N with the effects of a fit): at each place of a fit that has not seen
-    it; folds: else of the one fit."""
+def _held_out(
+    search: Search, found: Fit, names: tuple[str, ...]
+) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """((n, 3) N our law alone, (n, 3) N with the effects of a fit, by name (n, 3) N what each adds to the
+    others): at each place of a fit that has not seen it."""
     forward = search.forward
     t = forward.touches
     law, together = np.zeros_like(t.local_force), np.zeros_like(t.local_force)
-    base = law_of(found)
-    for fold in neighbours(t) if folds else [np.arange(t.sites)]:
-        again = _without(search, found, fold) if folds else found
-        with_it = forward.predict(settings_of(forward, again.effects, again.values, again.likeliest))
-        plainly = settings_of(forward, base, again.values[:1])
+    added = {name: np.zeros_like(law) for name in names}
+    for fold in neighbours(t):
+        again = _without(search, found, fold)
         rows = np.isin(t.site, fold)[t.press]
-        together[rows] = np.nan_to_num(with_it)[rows]
-        law[rows] = np.nan_to_num(forward.predict(plainly))[rows]
-    return law, together
+        whole = _predicted(forward, again, names)
+        together[rows] = whole[rows]
+        law[rows] = _predicted(forward, again)[rows]
+        for name in names:
+            without = _predicted(forward, again, tuple(n for n in names if n != name))
+            added[name][rows] = (whole - without)[rows]
+    return law, together, added
+
+
+def _predicted(forward: Forward, found: Fit, names: Sequence[str] = ()) -> np.ndarray:
+    """(n, 3) N of our law with these of a fit's effects; its first touches go with them, not with the law."""
+    effects = tuple(e for e in found.effects if e.role is Role.KNOWN or e.name in names)
+    values = np.concatenate([found.values[:1], *(found.of(e.name) for e in effects)])
+    onset = found.likeliest if names else None
+    return np.nan_to_num(forward.predict(settings_of(forward, effects, values, onset)))
 
 
 def seen_in_samples(signal: Signal) -> tuple[Signal, dict[str, tuple[NumericalEffect, dict[str, float]]]]:

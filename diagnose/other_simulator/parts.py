@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.numerics.registry import numerical
 from diagnose.options import AttributionOptions
 from diagnose.other_simulator.against_law import COMMON_ERROR, Numerics
 from diagnose.other_simulator.stated import Stated, StatedForward
@@ -114,11 +115,15 @@ def reality_of(findings: Findings, named: Sequence[str], strain: Sequence[Effect
     return Reality(t.local_force + offsets.residual, own, whole, names, modulus)
 
 
-def law_at(forward: StatedForward, stated: Stated, numerics: Numerics) -> np.ndarray:
-    """(n, 3) N: our law at other parameters, with finite strain where the simulator has it."""
+def law_at(
+    forward: StatedForward, stated: Stated, numerics: Numerics, flaws: Sequence[str] = ()
+) -> np.ndarray:
+    """(n, 3) N: our law at other parameters, with finite strain where the simulator has it, and with these of
+    the flaws that were fitted to it (numerics.values)."""
     other = dataclasses.replace(forward, stated=stated)
-    settings = settings_of(other, numerics.strain, np.array([np.log(stated.young_modulus_pa)]))
-    return np.nan_to_num(other.predict(settings))
+    effects = (*numerics.strain, *(numerical(name) for name in flaws))
+    values = [np.log([stated.young_modulus_pa]), *(numerics.values[name] for name in flaws)]
+    return np.nan_to_num(other.predict(settings_of(other, effects, np.concatenate(values))))
 
 
 def measured_parameters(
@@ -175,7 +180,7 @@ class Weighing:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A stated parameter that is named: what it adds, (n, 3) N, and its two values."""
+    """A stated parameter that is named: what it adds to our law, (n, 3) N, and its two values."""
 
     name: str
     force: np.ndarray

@@ -6,17 +6,11 @@ on the others: a mesh that is half too soft takes half of what a wrong tip adds.
 
 from __future__ import annotations
 
-import dataclasses
-import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from diagnose.numerics.registry import numerical
 from diagnose.other_simulator.against_law import Numerics
 from diagnose.other_simulator.parts import PARAMETER_OF, Weighing, law_at
 from diagnose.other_simulator.stated import Stated, StatedForward
-from diagnose.search.fit import settings_of
 
 
 def sizes_alone(
@@ -31,15 +25,12 @@ def sizes_alone(
     law = law_at(forward, measured, numerics)
     # what the samples themselves show is a share of the force that is there
     level = weighing.rms_n(law) / max(weighing.rms_n(numerics.with_numerics), 1e-12)
-    right = dataclasses.replace(forward, stated=measured)
     sizes = {}
     for name in numerics.named:
         if name not in numerics.values:
             sizes[name] = level * weighing.rms_n(numerics.force[name])
             continue
-        values = np.append(math.log(measured.young_modulus_pa), numerics.values[name])
-        settings = settings_of(right, (*numerics.strain, numerical(name)), values)
-        sizes[name] = weighing.rms_n(np.nan_to_num(right.predict(settings)) - law)
+        sizes[name] = weighing.rms_n(law_at(forward, measured, numerics, [name]) - law)
     for name in wrong:
         key = PARAMETER_OF[name]
         other = measured.but(key, getattr(forward.stated, key))

@@ -1,4 +1,5 @@
-"""MuJoCo: the object as a flex of linear tetrahedra on its base, and the tip as a mocap sphere.
+"""MuJoCo: the object as a flex of linear tetrahedra on its base, and the tip as a heavy sphere on three
+slides with a position actuator each: a mocap body has no velocity, and drags nothing along.
 
 A flex has one modulus and linear tetrahedra, which lock near nu = 0.5. They are graded under the tip; under a
 deep dent the flex, a Saint Venant-Kirchhoff solid, is softer than the model.
@@ -15,13 +16,19 @@ from palpate.exporting.subject import DENSITY_KG_M3, Subject
 TIMESTEP_S = 1e-3
 CONTACT = 'solref="0.004 1" solimp="0.999 0.999 0.001"'
 """As hard as the step allows."""
+HEAVY_KG, DRIVE_N_PER_M = 100.0, 1e6
+"""Of the tip: a newton moves it by a micrometre, and it follows what it is led to by 20 ms."""
 EDGE_RADII = 1 / 3
 """Of the tip: a file's flex is a Saint Venant-Kirchhoff solid, which the finer the mesh gives the more way
 where it is crushed; its radius, by which the surface stands off, makes up for that in a shallow press."""
 
 
+def _row(values: np.ndarray) -> str:
+    return " ".join(f"{value:.9g}" for value in values)
+
+
 def text_of(subject: Subject) -> str:
-    """The MJCF scene; `mocap_pos[0]` is the tip's centre, which starts off the surface."""
+    """The MJCF scene; `ctrl` of its three actuators leads the tip's centre away from its start, in metres."""
     mesh = subject.graded(EDGE_RADII)
     touch = f'condim="3" friction="{subject.friction:g}" {CONTACT}'
     middle, span = mesh.points.mean(axis=0), float(np.ptp(mesh.points, axis=0).max())
@@ -34,8 +41,9 @@ def text_of(subject: Subject) -> str:
 <custom><text name="pressed" data="{pressed}"/></custom>
 <worldbody>
 <light pos="{_row(middle + 3 * span * subject.model.support.normal)}"/>
-<body name="tip" mocap="true" pos="{_row(subject.start)}">
-<geom name="tip" type="sphere" size="{subject.radius_m:.6g}" {touch}/></body>
+<body name="tip" pos="{_row(subject.start)}">
+{_SLIDES}
+<geom name="tip" type="sphere" size="{subject.radius_m:.6g}" mass="{HEAVY_KG:g}" {touch}/></body>
 <flexcomp name="object" type="direct" dim="3" mass="{DENSITY_KG_M3 * float(mesh.volumes.sum()):.6g}"
 radius="1e-4"
  point="{_row(mesh.points.ravel())}"
@@ -44,8 +52,22 @@ radius="1e-4"
 <elasticity young="{subject.mean_modulus_pa:.6g}" poisson="{subject.model.material.poisson_ratio:.6g}"
  damping="0.01"/>
 <pin id="{" ".join(map(str, np.flatnonzero(mesh.fixed)))}"/>
-</flexcomp></worldbody></mujoco>
+</flexcomp></worldbody>
+<actuator>
+{_drives(span)}
+</actuator></mujoco>
 """
+
+
+_SLIDES = "\n".join(
+    f'<joint name="tip_{axis}" type="slide" axis="{_row(along)}"/>'
+    for axis, along in zip("xyz", np.eye(3), strict=True)
+)
+
+
+def _drives(reach_m: float) -> str:
+    drive = f'kp="{DRIVE_N_PER_M:g}" dampratio="1" ctrlrange="{-reach_m:.6g} {reach_m:.6g}"'
+    return "\n".join(f'<position name="tip_{axis}" joint="tip_{axis}" {drive}/>' for axis in "xyz")
 
 
 def write(path: Path, subject: Subject) -> tuple[str, ...]:
@@ -60,7 +82,3 @@ def write(path: Path, subject: Subject) -> tuple[str, ...]:
     if np.ptp(subject.model.element_ratio) > 1e-9:
         notes.append("a flex has one modulus: the mean by volume")
     return tuple(notes)
-
-
-def _row(values: np.ndarray) -> str:
-    return " ".join(f"{value:.9g}" for value in values)

@@ -6,18 +6,21 @@ import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from diagnose.forward.touches import LEAST_PRESSES
+from mechanics.errors import OptionError
 from mechanics.key_values import pairs, words_of
 from palpate.operations._declare import operand
 from render.options import DOCUMENTED, SETTINGS, RenderOptions
-from render.registry import simulator_names
+from render.registry import create, simulator_names
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
 
     from mechanics.model.model import Model
     from mechanics.progress import Progress
     from mechanics.recording.recording import Recording
-    from render.simulators.base import Adapter
+    from render.simulators.base import Adapter, SimulatorRenderer
 
 
 def simulator_operand(words: str) -> Any:
@@ -50,12 +53,14 @@ def told(whole_s: float, presses: int) -> str:
 
 class Ran(NamedTuple):
     """What a simulator gave: force (n, 3) N on the tool at every row of the recording, zeros where it was not
-    run; over which (p,) of the recording's presses; of which adapter; its settings in words."""
+    run; over which (p,) of the recording's presses; of which adapter; its settings in words; which presses
+    ended without an answer."""
 
     force: np.ndarray
     chosen: np.ndarray
     adapter: Adapter
     said: str
+    notes: tuple[str, ...] = ()
 
 
 def mended(settings: str, numbers: str, by: str) -> tuple[str, str]:
@@ -67,37 +72,49 @@ def mended(settings: str, numbers: str, by: str) -> tuple[str, str]:
     return (named or [settings])[-1], ",".join(f"{key}={value}" for key, value in over.items())
 
 
+def simulator(name: str, settings: str, numbers: str, model: Model) -> SimulatorRenderer:
+    """Ready to be run; raises OptionError where it is not installed or a setting is not there."""
+    made: Any = create(name, model, RenderOptions(simulator_settings=settings, simulator_set=numbers))
+    return made
+
+
+def fewest(made: Sequence[SimulatorRenderer]) -> int | None:
+    """Over how many presses all of them are run where nothing is asked, so that their gaps are of the same;
+    None: all."""
+    return min((each.adapter.presses for each in made if each.adapter.presses is not None), default=None)
+
+
 def run_along(
-    name: str,
-    settings: str,
-    numbers: str,
-    model: Model,
-    recording: Recording,
-    progress: Progress,
-    *,
-    most: int | None = None,
-    usual: bool = False,
+    made: SimulatorRenderer, recording: Recording, progress: Progress, *, most: int | None = None
 ) -> Ran:
-    """Run a simulator along a recording's presses, `most` of them, spread over its places (None: all; usual:
-    as many as the adapter takes). Raises OptionError where it is not installed, a setting is not there, or it
-    finds no answer."""
+    """Run a simulator along a recording's presses, `most` of them, spread over its places (None: all). One
+    for which it finds no answer is left out, and said; raises OptionError where that leaves too few."""
     from diagnose.other_simulator.presses_to_run import spread_out
     from reconstruct.presses_on_model import presses_on
-    from render.registry import create
     from render.replay import replay_touches
 
-    options = RenderOptions(simulator_settings=settings, simulator_set=numbers)
-    said = f"settings {settings}" + (f", {numbers}" if numbers else "")
-    made: Any = create(name, model, options, progress)
-    presses = presses_on(recording, model)
-    chosen = spread_out(presses, made.adapter.presses if most is None and usual else most)
+    options = made.options
+    numbers = f", {options.simulator_set}" if options.simulator_set else ""
+    said = f"settings {options.simulator_settings}{numbers}"
+    presses = presses_on(recording, made.model)
+    asked = spread_out(presses, most)
+    chosen, errors = asked.copy(), []
+
+    def failed(number: int, error: OptionError) -> None:
+        chosen[number] = False
+        errors.append(error)
+        if chosen.sum() < min(LEAST_PRESSES, asked.sum()):
+            raise error
 
     begun, estimate = time.monotonic(), ""
 
     def tell(words: str, share: float) -> None:
         nonlocal estimate
         if not estimate and share > TOLD_FROM:
-            estimate = ", " + told((time.monotonic() - begun) / share, int(chosen.sum()))
-        progress(f"{name}, {said}: {words}{estimate}", share)
+            estimate = ", " + told((time.monotonic() - begun) / share, int(asked.sum()))
+        progress(f"{made.name}, {said}: {words}{estimate}", share)
 
-    return Ran(replay_touches(made, recording, presses, chosen, tell), chosen, made.adapter, said)
+    force = replay_touches(made, recording, presses, asked, tell, failed)
+    without = f"{len(errors)} of {asked.sum()} presses ended without an answer and are left out"
+    notes = (f"{said}: {without}: {errors[0]}",) if errors else ()
+    return Ran(force, chosen, made.adapter, said, notes)

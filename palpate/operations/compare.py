@@ -28,6 +28,7 @@ from palpate.operations._simulators import (
     numbers_operand,
     run_along,
     settings_operand,
+    simulator,
     simulator_operand,
 )
 from palpate.operations.diagnose import diagnose
@@ -96,7 +97,8 @@ def compare(asked: CompareOperands, call: Call) -> Comparison:
         if plain is None:
             plain = reconstruct(measured, seed=asked.seed, progress=part(tell, 0.0, 0.3)).model
         settings, numbers = asked.simulator_settings, asked.simulator_set
-        ran = run_along(asked.renderer, settings, numbers, plain, measured, part(tell, 0.3, 0.7))
+        made = simulator(asked.renderer, settings, numbers, plain)
+        ran = run_along(made, measured, part(tell, 0.3, 0.7))
         simulated = {asked.renderer: Along(measured.t, ran.force)}
         return compared(
             measured, plain, chosen, simulated=simulated, seed=asked.seed, progress=part(tell, 0.7, 1.0)

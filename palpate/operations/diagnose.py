@@ -32,10 +32,12 @@ from palpate.operations._shared import (
     seed_operand,
 )
 from palpate.operations._simulators import (
+    fewest,
     mended,
     numbers_operand,
     run_along,
     settings_operand,
+    simulator,
     simulator_operand,
 )
 from palpate.operations.load import load
@@ -190,52 +192,60 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
         if forces is not None:
             simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
             return diagnose_simulated(measured, made, simulation, options, rest, **rules)
-        settings, numbers = asked.simulator_settings, asked.simulator_set
-
-        def simulation_of(settings: str, numbers: str, tell: Progress) -> Any:
-            return _simulation(asked, call, measured, made, settings, numbers, tell)
-
         told = part(tell, begun, 1.0)
-        simulation = simulation_of(settings, numbers, part(told, 0.0, 0.4))
-        found = diagnose_simulated(measured, made, simulation, options, part(told, 0.4, 0.8), **rules)
-        if asked.mended is None:
-            return found
-        after = mended(settings, numbers, asked.mended)
-        again = simulation_of(*after, part(told, 0.8, 0.95))
-        left = diagnose_simulated(
-            measured, made, again, options, part(told, 0.95, 1.0), reality=found.reality, **rules
-        )
-        return replace(found, mended=Mended(again.run_as, left.gap_before_n, left.effects))
+        simulations = _simulations(asked, call, measured, made, part(told, 0.0, 0.5))
+        found = diagnose_simulated(measured, made, simulations[0], options, part(told, 0.5, 0.9), **rules)
+        for again in simulations[1:]:
+            left = diagnose_simulated(
+                measured, made, again, options, part(told, 0.9, 1.0), reality=found.reality, **rules
+            )
+            found = replace(found, mended=Mended(again.run_as, left.gap_before_n, left.effects))
+        return found
 
 
-def _simulation(
-    asked: DiagnoseOperands,
-    call: Call,
-    measured: Recording,
-    model: Model,
-    settings: str,
-    numbers: str,
-    tell: Progress,
-) -> Any:
-    """A simulator that is run along the recorded path; and what it says of itself."""
+def _settings(asked: DiagnoseOperands) -> list[tuple[str, str]]:
+    """(settings, numbers) of each run of --renderer: as asked, then mended."""
+    settings, numbers = asked.simulator_settings, asked.simulator_set
+    runs = [(settings, numbers)]
+    return runs if asked.mended is None else [*runs, mended(settings, numbers, asked.mended)]
+
+
+def _simulations(
+    asked: DiagnoseOperands, call: Call, measured: Recording, model: Model, tell: Progress
+) -> list[Any]:
+    """What --renderer gave along the recorded path as asked, then mended, over the same presses; and what it
+    says of itself."""
+    import numpy as np
+
     from diagnose.other_simulator.forces import Forces
     from diagnose.other_simulator.pipeline import Asked
     from diagnose.other_simulator.stated import stated_of, stated_values
 
     assert asked.renderer is not None
-    ran = run_along(asked.renderer, settings, numbers, model, measured, tell, most=asked.presses, usual=True)
-    run, there = int(ran.chosen.sum()), len(ran.chosen)
-    some = f", spread over its places (--presses {there}: all)" if run < there else ""
-    notes = (
-        f"run here along {run} of the {there} recorded presses{some}: {ran.said}",
-        *(f"it cannot say: {x}" for x in ran.adapter.cannot),
-    )
-    forces = Forces(measured.t, ran.force, asked.renderer, notes, ran.chosen)
-    # what the adapter gave it, but for what is said
-    stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
-    own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
-    of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
-    return Asked(forces, stated, own_clock, *of_adapter)
+    made = [simulator(asked.renderer, *each, model) for each in _settings(asked)]
+    most = asked.presses or fewest(made)
+    share = 1 / len(made)
+    runs = [
+        run_along(each, measured, part(tell, k * share, (k + 1) * share), most=most)
+        for k, each in enumerate(made)
+    ]
+    chosen = np.logical_and.reduce([ran.chosen for ran in runs])
+    along, there = int(chosen.sum()), len(chosen)
+    some = f", spread over its places (--presses {there}: all)" if along < there else ""
+    simulations = []
+    for ran in runs:
+        notes = (
+            f"run here along {along} of the {there} recorded presses{some}: {ran.said}",
+            *(note for each in runs for note in each.notes),
+            *(f"it cannot say: {x}" for x in ran.adapter.cannot),
+        )
+        forces = Forces(measured.t, ran.force, asked.renderer, notes, chosen)
+        # what the adapter gave it, but for what is said
+        stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
+        of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
+        own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
+        simulations.append(Asked(forces, stated, own_clock, *of_adapter))
+    return simulations
 
 
 def _forces(asked: DiagnoseOperands) -> Any:
@@ -247,8 +257,7 @@ def _forces(asked: DiagnoseOperands) -> Any:
     if asked.presses is not None and asked.renderer is None:
         raise OptionError("--presses says over how many a simulator is run: name it by --renderer")
     if asked.renderer is not None:
-        settings, numbers = asked.simulator_settings, asked.simulator_set
-        for each in ((settings, numbers), mended(settings, numbers, asked.mended or "")):
+        for each in _settings(asked):
             check_settings(asked.renderer, *each)
     if asked.simulated is None:
         if asked.stated and asked.renderer is None:

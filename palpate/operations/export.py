@@ -1,6 +1,6 @@
 """A MODEL for other programs: a minimal scene that runs there, its mesh, or a page that can be pressed.
 
-mujoco (.xml): a flex on its base and the tip as a mocap sphere. sofa (.scn): tetrahedra, base, a sphere's
+mujoco (.xml): a flex on its base and a sphere on driven slides. sofa (.scn): tetrahedra, base, a sphere's
 force. abaqus (.inp): hybrid tetrahedra, base, a rigid sphere that is pressed in. gmsh (.msh): mesh, groups,
 moduli. usd (.usda): a deformable TetMesh with its material, base and tip. newton, drake (.py): scripts that
 press. stl: the boundary. page (.html): one file that any browser opens, offline, in which the object can be

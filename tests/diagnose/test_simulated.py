@@ -113,6 +113,16 @@ def test_what_is_named_first_does_not_depend_on_what_stands_beside_it(world):
     assert result.effects == ("mesh_stiffness", "stated_modulus")
 
 
+def test_mending_one_flaw_leaves_the_others_in_place(world):
+    """Of the same simulation: with the right modulus its mesh makes it too stiff by 0.7, and with the right
+    mesh it is too soft by 0.55, where as it came it was too soft by 0.235."""
+    force, modulus = 1.7 * 0.45 * world[3], world[1].material.young_modulus_pa
+    result = judged(world, force, modulus=0.45 * modulus)
+    left = {e.name: e.gap_after_n / result.gap_before_n for e in result.entries}
+    assert left["stated_modulus"] == pytest.approx(0.7 / 0.235, rel=0.15)
+    assert left["mesh_stiffness"] == pytest.approx(0.55 / 0.235, rel=0.15)
+
+
 def test_a_poisson_ratio_is_advised_as_far_as_a_simulator_takes_it():
     wrong = Parameter("stated_poisson_ratio", np.zeros((1, 3)), 0.35, 0.49)
     assert parameter_words(wrong) == "give it 0.49 for Poisson's ratio (it had 0.35)"

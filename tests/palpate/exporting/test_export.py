@@ -21,6 +21,7 @@ from mechanics.model.material import Ball, Material
 from mechanics.model.model import Model, Support, Tool
 from mechanics.shape.box_mesh import box_mesh
 from palpate import cli
+from render.simulators.mujoco import force_on_tip
 
 SIZE = (0.06, 0.05, 0.03)
 MATERIAL = ("youngsModulus", "poissonsRatio", "density", "dynamicFriction")
@@ -164,20 +165,21 @@ def _pressed(path) -> np.ndarray:
     return np.fromstring(text, sep=" ")
 
 
-def flex_force(path) -> float:
-    """The force on the tip, settled, with MuJoCo's own scene; N along z."""
+def flex_forces(path, aside_m: float = 0.0) -> np.ndarray:
+    """(2, 3) N on the tip with MuJoCo's own scene: settled where it is pressed, then led aside along x."""
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
-    start, pressed = data.mocap_pos[0].copy(), _pressed(path)
-    total, wrench = np.zeros(3), np.zeros(6)
-    for k in range(400):
-        data.mocap_pos[0] = start + (pressed - start) * min(1.0, k / 200)
-        mujoco.mj_step(model, data)
-    for c in range(data.ncon):
-        mujoco.mj_contactForce(model, data, c, wrench)
-        total += data.contact[c].frame.reshape(3, 3).T @ wrench[:3]
-    return float(abs(total[2]))
+    mujoco.mj_forward(model, data)
+    away = _pressed(path) - data.body("tip").xpos
+    found = []
+    for aim in (away, away + [aside_m, 0, 0]) if aside_m else (away,):
+        begun = data.ctrl.copy()
+        for k in range(200):
+            data.ctrl[:] = begun + (aim - begun) * min(1.0, k / 100)
+            mujoco.mj_step(model, data)
+        found.append(force_on_tip(mujoco, model, data))
+    return np.array(found)
 
 
 @pytest.mark.slow
@@ -189,10 +191,27 @@ def test_mujoco_runs_the_scene_and_presses_back_alike(tmp_path, cells):
     depth = 0.0008
     with contextlib.chdir(tmp_path):  # MuJoCo leaves its warnings in a file where it runs
         pp.export(model, "mujoco", tmp_path / "m.xml", depth_m=depth, progress=False)
-        theirs = flex_force(tmp_path / "m.xml")
+        theirs = abs(flex_forces(tmp_path / "m.xml")[0, 2])
     ours = pp.press(model, (0, 0, 0.03), (0, 0, -1), depth, progress=False)
     peak = float(np.abs(ours.force[:, 2]).max())
     assert theirs == pytest.approx(peak, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mu", [0.2, 2.0])
+def test_mujoco_tip_drags_the_surface_along_until_it_slips(tmp_path, mu):
+    """Sideways over normal force is by Mindlin and Hertz 3 (1 - nu) / (2 - nu) times way aside over depth
+    where the tip holds, 0.42 here; a slippery one stays at its friction."""
+    depth, aside = 0.0008, 0.0003
+    model = block(nu=0.4, order=1, ball=False, cells=(5, 4, 3))
+    model = model.replaced(effects={"friction_slip": {"mu": mu}})
+    with contextlib.chdir(tmp_path):
+        pp.export(model, "mujoco", tmp_path / "m.xml", depth_m=depth, progress=False)
+        still, dragged = flex_forces(tmp_path / "m.xml", aside)
+    push, side = dragged[2], -dragged[0]
+    assert push > 0.8 * still[2] > 0
+    holds = 3 * (1 - 0.4) / (2 - 0.4) * aside / depth
+    assert side / push == pytest.approx(min(mu, holds), rel=0.25)
 
 
 def test_the_command_says_what_is_lost_and_refuses_in_one_line(tmp_path, capsys):
