@@ -15,12 +15,13 @@ from mechanics.press_solver.solid import Response, Solid
 @dataclass(frozen=True)
 class BodyMaterial:
     """poisson_ratio; stiffening and coupled: the law at finite strain (Solid); ratio: (m,) modulus of each
-    cell over the global one."""
+    cell over the global one; local_bulk: see Solid."""
 
     poisson_ratio: float
     stiffening: float
     coupled: bool
     ratio: np.ndarray
+    local_bulk: float = 0.0
 
 
 class Body:
@@ -36,7 +37,7 @@ class Body:
     ) -> None:
         def solid(cells: np.ndarray) -> Solid:
             law = (material.poisson_ratio, material.stiffening, material.ratio[cells], material.coupled)
-            return Solid(mesh.points, mesh.cells[cells], *law)
+            return Solid(mesh.points, mesh.cells[cells], *law, material.local_bulk)
 
         self._count = len(mesh.points)
         free = ~mesh.fixed

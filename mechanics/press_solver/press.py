@@ -21,6 +21,11 @@ _LONGEST = 1.3
 
 LAWS = ("linear", "neo-hookean")
 
+_LOCAL_BULK = 5.0
+"""Of a linear body (Solid): by their means alone, elements as wide as half a contact are 0.7 to 1.9 % softer
+than closed forms and the axisymmetric table; with 8 they are 0.3 % softer to 1.4 % harder. At finite strain
+there is none: by their means the table is met to 0.4 %, and with 5 they are 1.0 to 1.6 % too hard."""
+
 
 @dataclass(frozen=True)
 class PressOptions:
@@ -162,8 +167,9 @@ class PressSolver:
             near = far(mesh.points[mesh.cells[:, :4]].mean(axis=1)) < options.zone * last
             near |= np.isin(mesh.cells, faces).any(axis=1)
         nodes = np.unique(faces)
+        local = _LOCAL_BULK if options.law == "linear" else 0.0
         material = BodyMaterial(
-            self.poisson_ratio, options.stiffening, options.coupled, self._ratio[mesh.parent]
+            self.poisson_ratio, options.stiffening, options.coupled, self._ratio[mesh.parent], local
         )
         body = Body(mesh, material, near, nodes)
         contact = SphereContact(

@@ -21,6 +21,8 @@ from mechanics.elastic.elasticity import lame_parameters, shape_derivatives
 from mechanics.kernels import kernel
 from mechanics.press_solver.graded_mesh import GAUSS
 
+_LOCAL_SHARE = 0.1
+
 
 @dataclass
 class Response:
@@ -40,7 +42,8 @@ class Response:
 class Solid:
     """Elements of a body: points (n, 3) m, cells (m, 10), their modulus over the global one (m,), or None.
 
-    stiffening: r of the family, 0 neo-Hookean. coupled: which of the two energies.
+    stiffening: r of the family, 0 neo-Hookean. coupled: which of the two energies. local_bulk: bulk modulus
+    over the shear modulus that is held point by point instead of by an element's mean, a tenth at most.
     """
 
     def __init__(
@@ -51,6 +54,7 @@ class Solid:
         stiffening: float = 0.0,
         ratio: np.ndarray | None = None,
         coupled: bool = False,
+        local_bulk: float = 0.0,
     ) -> None:
         self.cells = np.ascontiguousarray(cells)
         self.stiffening, self.coupled = float(stiffening), coupled
@@ -61,7 +65,9 @@ class Solid:
         self.gradients = np.ascontiguousarray(np.einsum("eqyx,qax->eqay", np.linalg.inv(jacobian), slopes))
         lam, mu = lame_parameters(1.0, poisson_ratio)
         ratio = np.ones(len(cells)) if ratio is None else np.asarray(ratio, dtype=float)
-        self.shear, self.bulk = mu * ratio, (lam if coupled else lam + 2 * mu / 3) * ratio
+        bulk = lam if coupled else lam + 2 * mu / 3
+        local = min(_LOCAL_SHARE * bulk, local_bulk * mu)
+        self.shear, self.bulk, self.local_bulk = mu * ratio, (bulk - local) * ratio, local * ratio
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -81,8 +87,8 @@ class Solid:
         own, slope = np.empty(m), np.empty(m)
         given = np.empty(0) if pressure is None else pressure
         energy = _respond(
-            self.cells, displacement, self.gradients, self.weights, self.shear, self.bulk, self.stiffening,
-            self.coupled, given, tangent,
+            self.cells, displacement, self.gradients, self.weights, self.shear, self.bulk, self.local_bulk,
+            self.stiffening, self.coupled, given, tangent,
             np.empty((4, 3, 3)), np.empty((6, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3, 3)),
             forces, stiffness, own, slope, growth,
         )  # fmt: skip
@@ -93,7 +99,7 @@ class Solid:
 
 @kernel
 def _respond(
-    cells, u, gradients, weights, shear, bulk, ratio, coupled, given, tangent, f, h, moduli, half,
+    cells, u, gradients, weights, shear, bulk, local_bulk, ratio, coupled, given, tangent, f, h, moduli, half,
     forces, stiffness, pressure, slope, growth,
 ):  # fmt: skip
     """Energy; nan where an element is turned inside out. f, h, moduli, half: room to work in."""
@@ -114,16 +120,9 @@ def _respond(
                 return np.nan
             volume += weights[e, q]
             deformed += weights[e, q] * det
-        theta = deformed / volume
-        log = np.log(theta)
-        if coupled:
-            pressure[e] = bulk[e] * log / theta
-            slope[e] = bulk[e] * (1 - log) / (theta * theta) / volume
-            total += volume * bulk[e] * 0.5 * log * log
-        else:
-            pressure[e] = bulk[e] * 0.5 * (theta - 1 / theta)
-            slope[e] = bulk[e] * 0.5 * (1 + 1 / (theta * theta)) / volume
-            total += volume * bulk[e] * 0.5 * (0.5 * (theta * theta - 1) - log)
+        stored, per_bulk, per_theta = _volume_energy(deformed / volume, coupled)
+        total += volume * bulk[e] * stored
+        pressure[e], slope[e] = bulk[e] * per_bulk, bulk[e] * per_theta / volume
         believed = given[e] if given.shape[0] else pressure[e]
         for r in range(30):
             forces[e, r] = 0.0
@@ -153,15 +152,17 @@ def _respond(
             else:
                 hard, harder, energy = 1.0, 0.0, excess
             mu = shear[e]
-            total += w * 0.5 * mu * energy
+            stored, per_bulk, per_theta = _volume_energy(det, coupled)
+            local, stiffer = local_bulk[e] * per_bulk, local_bulk[e] * per_theta * det * det
+            total += w * (0.5 * mu * energy + local_bulk[e] * stored)
             # half the derivative of I1 or I1bar, kept in h[3:6]
             for i in range(3):
                 for j in range(3):
                     h[3 + i, j] = scale * (f[q, i, j] - (0.0 if coupled else first / 3 * h[i, j]))
-            around = 0.0  # what the shear modulus adds to the pressure
+            around = local  # pressure of this point alone
             if coupled:
                 total -= w * mu * np.log(det)
-                around = -mu / det
+                around -= mu / det
             for a in range(10):
                 for i in range(3):
                     push, grow = 0.0, 0.0
@@ -171,13 +172,14 @@ def _respond(
                     forces[e, 3 * a + i] += w * (mu * hard * push + around * det * grow)
                     growth[e, 3 * a + i] += w * det * grow
             if tangent:
-                p = believed * det
+                p = (believed + local) * det
                 c = mu * hard * scale
                 for i in range(3):
                     for j in range(3):
                         for k in range(3):
                             for l in range(3):
                                 value = p * (h[i, j] * h[k, l] - h[i, l] * h[k, j])
+                                value += stiffer * h[i, j] * h[k, l]
                                 if coupled:
                                     value += mu * h[i, l] * h[k, j]
                                 else:
@@ -212,6 +214,16 @@ def _respond(
                 for s in range(r):
                     stiffness[e, r, s] = stiffness[e, s, r]
     return total
+
+
+@kernel
+def _volume_energy(theta, coupled):
+    """(U, U', U'') of a volume ratio, for unit bulk modulus."""
+    log = np.log(theta)
+    if coupled:
+        return 0.5 * log * log, log / theta, (1 - log) / (theta * theta)
+    square = theta * theta
+    return 0.5 * (0.5 * (square - 1) - log), 0.5 * (theta - 1 / theta), 0.5 * (1 + 1 / square)
 
 
 @kernel

@@ -50,10 +50,10 @@ def test_a_uniform_deformation_leaves_inner_nodes_in_balance():
 
 
 @pytest.mark.parametrize("coupled", [False, True])
-@pytest.mark.parametrize("stiffening", [0.0, 0.6, -0.3])
-def test_force_is_the_slope_of_energy_and_tangent_that_of_force(stiffening, coupled):
+@pytest.mark.parametrize("stiffening, local", [(0.0, 0.0), (0.6, 0.0), (-0.3, 5.0)])
+def test_force_is_the_slope_of_energy_and_tangent_that_of_force(stiffening, local, coupled):
     mesh, rng = graded_box(), np.random.default_rng(0)
-    solid = Solid(mesh.points, mesh.cells, 0.49, stiffening, coupled=coupled)
+    solid = Solid(mesh.points, mesh.cells, 0.49, stiffening, coupled=coupled, local_bulk=local)
     u = mesh.points @ (0.08 * rng.normal(size=(3, 3))) + 2e-5 * np.sin(300 * mesh.points)
     d = mesh.points @ rng.normal(size=(3, 3)) + 1e-4 * rng.normal(size=u.shape)
     here, step = solid.respond(u, tangent=True), 1e-5
