@@ -139,14 +139,17 @@ _MOST = {
 
 def verdict(result: SimulatedGap) -> str:
     """The answer in one sentence."""
-    if not result.effects:
-        return "nothing stands out: neither numerics nor parameters nor what an ideal simulation lacks"
     first = max(PARTS, key=lambda name: result.parts[name].share)
-    most = _MOST[first]
-    if result.unexplained > result.parts[first].share:
+    if settled := _settled(result):
+        most = f"most of the gap is numerics: {settled}"
+    elif not result.effects:
+        return "nothing stands out: neither numerics nor parameters nor what an ideal simulation lacks"
+    elif result.unexplained > result.parts[first].share:
         most = "most of the gap is not explained"
+    else:
+        most = _MOST[first]
     rivals = f" (not ruled out: {spoken(result.candidates, 'or')})" if result.candidates else ""
-    return f"{most}; named: {spoken(result.effects)}{rivals}"
+    return f"{most}; named: {spoken(result.effects) or 'nothing'}{rivals}"
 
 
 def lines(result: SimulatedGap) -> list[str]:
@@ -214,17 +217,32 @@ def lead(result: SimulatedGap) -> str:
     """The page's first words: how far off, and by what most; or that most of it is not explained."""
     off, left = f"It is off by {force_words(result.gap_before_n)}", _open(result)
     most = max(part.share for part in result.parts.values())
-    if not result.effects:
+    numbers = {e.name: keys_in_words(e) for e in result.entries}
+    said = [meaning(n) + (f" ({numbers[n]})" if numbers.get(n) else "") for n in result.effects[:2]]
+    if settled := _settled(result):
+        shown = f" What shows of it: {said[0]}." if said else ""
+        return f"{off}; {settled}, so most of that is numerics.{shown}"
+    if not said:
         if left > LITTLE:
             return f"{off}, and nothing that is known here explains {percent(left)} of that."
         return "Nothing stands out: this simulation is as near to the measured forces as they can tell."
-    numbers = {e.name: keys_in_words(e) for e in result.entries}
-    said = [meaning(n) + (f" ({numbers[n]})" if numbers.get(n) else "") for n in result.effects[:2]]
     if left > most:
         return f"{off}, and {percent(left)} of that is not explained. A smaller part is: {said[0]}."
     return f"{off}. Above all: {'; then: '.join(said)}." + (
         f" Not ruled out: {spoken(result.candidates, 'or')}." if result.candidates else ""
     )
+
+
+def _settled(result: SimulatedGap) -> str:
+    """How far a run with mended settings is off, in words, where that took away most of the gap and more than
+    any part explains; else ''."""
+    again = result.mended
+    if again is None or not result.gap_before_n > 0:
+        return ""
+    gone = 1 - (again.gap_n / result.gap_before_n) ** 2
+    if gone <= max(0.5, *(part.share for part in result.parts.values())):
+        return ""
+    return f"run again with {again.settings} it is off by {force_words(again.gap_n)}"
 
 
 def _open(result: SimulatedGap) -> float:

@@ -152,6 +152,12 @@ def test_a_gap_that_nothing_explains_is_said_first(world):
     result = judged(world, world[3] * (1 + 0.8 * np.sin(2.4 * world[0].t))[:, None])
     assert result.unexplained > 0.5
     assert " explain" in lead(result) and "Above all" not in lead(result)
+    # a run with mended settings that takes most of it away says what no part does
+    again = dataclasses.replace(result, mended=Mended("settings best", result.gap_before_n / 20, ()))
+    assert "run again with settings best" in lead(again) and "not explained" not in lead(again)
+    assert "most of the gap is numerics" in again.lines()[0]
+    little = dataclasses.replace(result, mended=Mended("settings best", 0.9 * result.gap_before_n, ()))
+    assert lead(little) == lead(result)
     assert "Above all: " in lead(judged(world, 1.5 * world[3]))
     assert "Nothing stands out" in lead(judged(world, world[3]))
 
