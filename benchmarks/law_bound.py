@@ -217,12 +217,12 @@ def _two_truths(rows: list[dict[str, Any]]) -> list[Figure]:
         return []
     off = np.concatenate(both)
     off = off[np.isfinite(off)]
-    ends = float(off.min()), float(off.max())
+    worst = float(np.abs(off).max())
     return [
         Figure(
             f"our own solver beside the laboratory, rms, {len(off)} presses",
             float(np.sqrt((off**2).mean())),
-            ends,
+            (-worst, worst),
             "%",
         )
     ]
