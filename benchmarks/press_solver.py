@@ -91,9 +91,12 @@ class Block:
         self.mesh, self.surface = box_mesh((4, 4, 2), (0.6, 0.6, 0.3)), None
         self.point, self.normal = np.array([0.0, 0.0, 0.3]), np.array([0.0, 0.0, 1.0])
 
-    def pressed(self, depths: np.ndarray, options: PressOptions) -> tuple[np.ndarray, float]:
+    def pressed(
+        self, depths: np.ndarray, options: PressOptions, poisson_ratio: float = POISSON_RATIO
+    ) -> tuple[np.ndarray, float]:
         """(normal force (k,) for unit modulus, processor time s)."""
-        return _pressed(self.mesh, self.surface, (self.point, self.normal), depths, options)
+        place = self.point, self.normal
+        return _pressed(self.mesh, self.surface, place, depths, options, poisson_ratio)
 
 
 class Place:
@@ -145,12 +148,13 @@ def _pressed(
     place: tuple[np.ndarray, np.ndarray],
     depths: np.ndarray,
     options: PressOptions,
+    poisson_ratio: float = POISSON_RATIO,
 ) -> tuple[np.ndarray, float]:
     solver = PressSolver(
         mesh,
         surface,
         young_modulus_pa=1.0,
-        poisson_ratio=POISSON_RATIO,
+        poisson_ratio=poisson_ratio,
         tip_radius_m=RADIUS_M,
         options=options,
     )

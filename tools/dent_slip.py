@@ -12,12 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.press_solver import RADIUS_M, Block
 from mechanics.disk.writing import atomic_file
-from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.shape.box_mesh import box_mesh
+from mechanics.press_solver.press import PressOptions
 from tools.script import script
 
-RADIUS_M, HALF_M, HEIGHT_M = 5e-3, 0.3, 0.3
 DEPTHS = np.array([0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5])
 """Tip radii."""
 RATIOS, FRICTIONS = (0.35, 0.49), (0.0, 0.05, 0.1, 0.2, 0.4)
@@ -30,7 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, np.ndarray]:
     """Solve, print, and write."""
-    rows = []
+    rows, block = [], Block()
+
+    def pressed(nu: float, friction: float | None) -> np.ndarray:
+        return block.pressed(RADIUS_M * DEPTHS, PressOptions(coupled=True, friction=friction), nu)[0]
+
     for nu in RATIOS:
         sticking = pressed(nu, None)
         for friction in FRICTIONS:
@@ -47,17 +50,6 @@ def run(arguments: argparse.Namespace) -> dict[str, np.ndarray]:
             table, form = [[0.0, 0.0, *DEPTHS], *rows], ["%.2f", "%.2f", *len(DEPTHS) * ["%.4f"]]
             np.savetxt(temporary, table, fmt=form, delimiter=",", header=header)
     return {"rows": np.array(rows)}
-
-
-def pressed(poisson_ratio: float, friction: float | None) -> np.ndarray:
-    """(depths,) m^2: normal force over the modulus; friction None sticks."""
-    solver = PressSolver(
-        box_mesh((4, 4, 2), (2 * HALF_M, 2 * HALF_M, HEIGHT_M)), None, young_modulus_pa=1.0,
-        poisson_ratio=poisson_ratio, tip_radius_m=RADIUS_M,
-        options=PressOptions(coupled=True, friction=friction),
-    )  # fmt: skip
-    up = np.array([0.0, 0.0, 1.0])
-    return solver.press(HEIGHT_M * up, up, RADIUS_M * DEPTHS).force @ up
 
 
 if __name__ == "__main__":

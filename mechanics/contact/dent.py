@@ -129,6 +129,7 @@ def _hertz() -> tuple[np.ndarray, str]:
     return np.tile([4 / 3, 1.0, 1.0], (_STEPS + 1, 1)), "Hertz 1882: paraboloid, a << R"
 
 
+@lru_cache(maxsize=1)
 def _sphere() -> tuple[np.ndarray, str]:
     # parametrised by a/R < 1, dense where the indentation grows without bound
     a = 1 - np.geomspace(1.0, 1e-5, 40001)[1:]

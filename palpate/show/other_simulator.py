@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -164,7 +165,9 @@ def lines(result: SimulatedGap) -> list[str]:
     for name in PARTS:
         part = result.parts[name]
         said = f"  {name}, {MEANING[name]}: {force_words(part.gap_n)}, {percent(part.share)}"
-        text.append(": ".join([said, *(["; ".join(_numbered(result, name))] if part.names else [])]))
+        text.append(
+            ": ".join([said, *(["; ".join(_named(result, part.names, _spaced))] if part.names else [])])
+        )
     text.append(
         f"  unexplained: {force_words(result.unexplained_n)}, {percent(result.unexplained)} (the sensor's "
         f"noise {percent(result.noise_share)}, first touches {percent(result.touch_share)})"
@@ -194,14 +197,14 @@ def mended_words(result: SimulatedGap) -> str:
     )
 
 
-def _numbered(result: SimulatedGap, part: str) -> list[str]:
-    """What is named in a part, each with its numbers."""
-    known = {e.name: e for e in result.entries}
-    said = []
-    for name in result.parts[part].names:
-        numbers = keys_in_words(known[name]) if name in known else ""
-        said.append(name.replace("_", " ") + (f" ({numbers})" if numbers else ""))
-    return said
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _named(result: SimulatedGap, names: Sequence[str], words: Callable[[str], str] = meaning) -> list[str]:
+    """Effects in words, each with its numbers."""
+    numbers = {e.name: keys_in_words(e) for e in result.entries}
+    return [words(name) + (f" ({numbers[name]})" if numbers.get(name) else "") for name in names]
 
 
 def _given(result: SimulatedGap) -> list[tuple[str, str, str, str]]:
@@ -217,8 +220,7 @@ def lead(result: SimulatedGap) -> str:
     """The page's first words: how far off, and by what most; or that most of it is not explained."""
     off, left = f"It is off by {force_words(result.gap_before_n)}", _open(result)
     most = max(part.share for part in result.parts.values())
-    numbers = {e.name: keys_in_words(e) for e in result.entries}
-    said = [meaning(n) + (f" ({numbers[n]})" if numbers.get(n) else "") for n in result.effects[:2]]
+    said = _named(result, result.effects[:2])
     if settled := _settled(result):
         shown = f" What shows of it: {said[0]}." if said else ""
         return f"{off}; {settled}, so most of that is numerics.{shown}"
@@ -251,15 +253,10 @@ def _open(result: SimulatedGap) -> float:
 
 
 def _cards(result: SimulatedGap) -> list[tuple[str, str, str]]:
-    known = {e.name: e for e in result.entries}
     cards = []
     for name in PARTS:
         part = result.parts[name]
-        said = []
-        for each in part.names:
-            numbers = keys_in_words(known[each]) if each in known else ""
-            said.append(meaning(each) + (f" ({numbers})" if numbers else ""))
-        text = "; ".join(said) or "nothing is named here"
+        text = "; ".join(_named(result, part.names)) or "nothing is named here"
         cards.append(
             (
                 f"{name.capitalize()}: {MEANING[name]}",
