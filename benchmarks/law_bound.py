@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,6 @@ from benchmarks._pressed_places import in_laboratory, kept_force, rendered
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import TIP_M, meshed
 from benchmarks.timing import table
-from mechanics.contact.dent import GRIPS
 from mechanics.disk.store import content_key
 from mechanics.press_solver.press import PressOptions, PressSolver
 from mechanics.shape.tetmesh import TetMesh
@@ -35,9 +34,6 @@ OF_THICKNESS, DEEPEST_M, LEAST_M, FIRST = 0.3, 2.5 * TIP_M, 2e-3, 0.12
 """Depths go to that share of what lies below, at most so deep, but always to LEAST_M; from that share on."""
 RATIOS, FRICTIONS, STICKING = (0.3, 0.49), (0.1, 1.0), 0.4
 """Poisson's ratios; coefficients of friction, even in their logarithm; the share of places that stick."""
-FINEST, GROWTH = 0.7, 1.0
-"""Of our own solver's mesh where a tip sticks: a press takes half the time of its usual one. Where it slips
-deep, such a mesh is up to 3 % too hard."""
 CANDIDATES = 300
 
 
@@ -102,11 +98,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         shape = EIGHT[name]()
         mesh = meshed(shape, 0.01)
         for one in drawn(name, shape, arguments.places, arguments.depths, arguments.seed):
-            usual = "" if _options(one).finest == FINEST else ", its usual mesh"
-            truth = {"coupled": kept(f"press solver 2{usual}", shape, one, own_solver(mesh))}
+            truth = {"coupled": kept("press solver 2, its usual mesh", shape, one, own_solver(mesh))}
             if one.friction is None and laboratory > 0:
                 laboratory -= 1
-                truth["split"] = kept("press solver 2, split", shape, one, own_solver(mesh, coupled=False))
+                truth["split"] = kept("press solver 3, split", shape, one, own_solver(mesh, coupled=False))
                 truth["laboratory"] = kept("laboratory 1", shape, one, by_laboratory)
             force, numbers = rendered(
                 mesh, one.point[None], one.normal[None], one.depths,
@@ -129,20 +124,14 @@ def kept(name: str, shape: KnownShape, one: Drawn, solve: Solve) -> np.ndarray:
     return kept_force(key, lambda: solve(shape, one))
 
 
-def _options(one: Drawn) -> PressOptions:
-    usual = PressOptions(coupled=True, friction=one.friction)
-    slips = one.friction is not None and one.friction < GRIPS
-    return usual if slips else replace(usual, finest=FINEST, growth=GROWTH)
-
-
 def own_solver(mesh: TetMesh, *, coupled: bool = True) -> Solve:
     """mechanics.press_solver on the tetrahedra of a mesh, by either energy."""
 
     def solve(shape: KnownShape, one: Drawn) -> np.ndarray:
+        options = PressOptions(coupled=coupled, friction=one.friction)
         solver = PressSolver(
             mesh.linear(), (shape.vertices, shape.triangles), young_modulus_pa=1.0,
-            poisson_ratio=one.poisson_ratio, tip_radius_m=TIP_M,
-            options=replace(_options(one), coupled=coupled),
+            poisson_ratio=one.poisson_ratio, tip_radius_m=TIP_M, options=options,
         )  # fmt: skip
         return solver.press(one.point, one.normal, one.depths).force @ one.normal
 
