@@ -16,7 +16,7 @@ from mechanics.disk.store import content_key, load_or_build
 from mechanics.model.model import Model
 from mechanics.presses.table import Presses
 
-VERSION = 6
+VERSION = 7
 UNIFORM = "uniform solver"
 """Stage: the factorisation that the places were solved by, of the object of one modulus."""
 GRAIN_M = 0.0008

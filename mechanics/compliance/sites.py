@@ -178,7 +178,7 @@ def touch_sites(
     bracing, rims = np.zeros(len(points)), np.zeros(len(points))
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)
-        missed = edge_law(mesh, points, normals)
+        missed = edge_law(mesh, points, normals, poisson_ratio)
         far, bracing, rims = far + missed.far, missed.bracing, missed.curvature
     if curvature is None:
         curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)

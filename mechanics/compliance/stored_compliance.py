@@ -52,7 +52,7 @@ def compliance_key(model: Model, options: ComplianceOptions | None = None) -> st
     balls = tuple(material.inclusions.values())
     error = (options or ComplianceOptions()).error_of(model.mesh)
     return content_key(
-        "surface compliance 7",
+        "surface compliance 8",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,

@@ -19,8 +19,8 @@ _POINTS = np.full((4, 4), _B) + (_A - _B) * np.eye(4)
 _WEIGHTS = np.full(4, 0.25)
 _CHUNK = 4000
 
-NEARLY_INCOMPRESSIBLE = 0.495
-"""Poisson's ratio beyond which the plain quadratic element is 2 to 4 % too stiff on 10 mm (decision 10)."""
+LOCAL_BULK = 1.5
+"""Of Lame's lambda over mu, what a quadratic element holds point by point; it holds the rest by its mean."""
 
 
 def lame_parameters(young_modulus: float, poisson_ratio: float) -> tuple[float, float]:
@@ -55,16 +55,15 @@ def shape_derivatives(order: int, barycentric: np.ndarray) -> np.ndarray:
 
 
 def element_stiffness(
-    corners: np.ndarray, order: int, poisson_ratio: float, *, mean_dilatation: bool | None = None
+    corners: np.ndarray, order: int, poisson_ratio: float, *, local_bulk: float = LOCAL_BULK
 ) -> np.ndarray:
     """Element matrices for unit Young's modulus: (m, k, 3, k, 3) with k = 4 or 10 nodes, in metres.
 
     K[i, a, j, b] = integral of lambda B_ia B_jb + mu (B_ib B_ja + delta_ab B_i . B_j), B the shape
-    gradients. `mean_dilatation` replaces the divergence by its mean over the element (B-bar), which
-    keeps quadratic elements from locking; None: above NEARLY_INCOMPRESSIBLE.
+    gradients. Of lambda, at most `local_bulk` mu acts on the divergence at every point, which makes quadratic
+    elements too hard near nu = 0.5; the rest on its mean over the element (B-bar; Hughes 1980), which alone
+    makes them too soft. Infinite: all at every point.
     """
-    if mean_dilatation is None:
-        mean_dilatation = order == 2 and poisson_ratio > NEARLY_INCOMPRESSIBLE
     lam, mu = lame_parameters(1.0, poisson_ratio)
     gradients, volumes = barycentric_gradients(corners)
     points, weights = (_POINTS, _WEIGHTS) if order == 2 else (np.full((1, 4), 0.25), np.ones(1))
@@ -75,13 +74,13 @@ def element_stiffness(
     m, q, k, _ = b.shape
     flat, weighted_flat = b.reshape(m, q, 3 * k), weighted.reshape(m, q, 3 * k)
     outer = np.einsum("mqx,mqy->mxy", weighted_flat, flat, optimize=True).reshape(m, k, 3, k, 3)
-    if mean_dilatation:
-        mean = weighted_flat.sum(axis=1)
-        divergence = (mean[:, :, None] * mean[:, None, :] / volumes[:, None, None]).reshape(m, k, 3, k, 3)
-    else:
-        divergence = outer
     laplace = np.einsum("miaja->mij", outer)
-    matrices = lam * divergence + mu * outer.transpose(0, 1, 4, 3, 2)
+    at_points = min(lam, local_bulk * mu) if order == 2 else lam
+    matrices = at_points * outer + mu * outer.transpose(0, 1, 4, 3, 2)
+    if at_points < lam:
+        mean = weighted_flat.sum(axis=1)
+        by_mean = ((lam - at_points) / volumes)[:, None] * mean
+        matrices += (by_mean[:, :, None] * mean[:, None, :]).reshape(m, k, 3, k, 3)
     for a in range(3):
         matrices[:, :, a, :, a] += mu * laplace
     return matrices
@@ -92,11 +91,12 @@ def stiffness(
     poisson_ratio: float,
     modulus_ratio: np.ndarray | None = None,
     *,
-    mean_dilatation: bool | None = None,
+    local_bulk: float = LOCAL_BULK,
 ) -> sp.csr_matrix:
     """Stiffness for unit Young's modulus: symmetric (3n, 3n), m (newtons a metre a pascal), nothing fixed.
 
-    modulus_ratio: (m,) modulus of each tetrahedron over the global one; None: homogeneous.
+    modulus_ratio: (m,) modulus of each tetrahedron over the global one; None: homogeneous. local_bulk: see
+    `element_stiffness`.
     Raises MeshError where the ratio does not fit the mesh.
     """
     m, n = len(mesh.tetrahedra), len(mesh.points)
@@ -110,9 +110,8 @@ def stiffness(
     blocks = np.zeros((len(unique), 3, 3))
     for start in range(0, m, _CHUNK):
         part = slice(start, start + _CHUNK)
-        element = element_stiffness(
-            mesh.points[tets[part, :4]], mesh.order, poisson_ratio, mean_dilatation=mean_dilatation
-        )
+        corners = mesh.points[tets[part, :4]]
+        element = element_stiffness(corners, mesh.order, poisson_ratio, local_bulk=local_bulk)
         element *= ratio[part, None, None, None, None]
         index = place[part].ravel()
         low = int(index.min())

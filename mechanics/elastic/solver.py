@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from mechanics.elastic import pardiso
-from mechanics.elastic.elasticity import stiffness
+from mechanics.elastic.elasticity import LOCAL_BULK, stiffness
 from mechanics.elastic.held_base import BaseHold
 from mechanics.errors import MeshError, OptionError
 from mechanics.shape.tetmesh import TetMesh
@@ -20,8 +20,8 @@ class Solver:
     """Displacements for nodal forces on a mesh with a fixed base, for unit Young's modulus.
 
     modulus_ratio: (m,) or None. backend: 'pardiso', 'superlu' or None for the best that is there.
-    hold: how the base is held; None: bonded. The factorisation is done in the constructor. Raises
-    MeshError where nothing is fixed (rigid motion).
+    local_bulk: see `element_stiffness`. hold: how the base is held; None: bonded. The factorisation is done
+    in the constructor. Raises MeshError where nothing is fixed (rigid motion).
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class Solver:
         modulus_ratio: np.ndarray | None = None,
         *,
         backend: str | None = None,
-        mean_dilatation: bool | None = None,
+        local_bulk: float = LOCAL_BULK,
         hold: BaseHold | None = None,
     ) -> None:
         self.mesh = mesh
@@ -42,7 +42,7 @@ class Solver:
         if self.backend not in BACKENDS:
             raise OptionError(f"backend is '{backend}'; allowed are {', '.join(BACKENDS)}")
         self.free = free_dofs(mesh, hold)
-        full = stiffness(mesh, poisson_ratio, modulus_ratio, mean_dilatation=mean_dilatation)
+        full = stiffness(mesh, poisson_ratio, modulus_ratio, local_bulk=local_bulk)
         springs = None if hold is None else hold.stiffness(mesh)
         if springs is not None:
             full = (full + springs).tocsr()

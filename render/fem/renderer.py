@@ -158,7 +158,7 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
     touched = np.unique(arrays.triangles[arrays.free > 0])
     points, normals = arrays.vertices[touched], arrays.normals[touched]
     far, bracing = np.zeros((len(arrays.vertices), 3, 3)), np.zeros(len(arrays.vertices))
-    missed = edge_law(mesh, points, normals)
+    missed = edge_law(mesh, points, normals, model.material.poisson_ratio)
     far[touched], bracing[touched] = compliance.far_at(points, normals) + missed.far, missed.bracing
     softness = np.ones(len(arrays.vertices))
     softness[touched] = surface_softness(mesh, model.surface_ratio, points, model.tool.tip_radius_m)

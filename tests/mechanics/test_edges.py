@@ -51,7 +51,7 @@ def test_a_rim_is_soft_at_first_and_the_harder_the_deeper_and_nothing_further_in
     assert np.count_nonzero(beside) == 1  # along the normal alone
     at_edge, beside, far = 0.005 * law.bracing
     assert 1 > beside > 0.5 > at_edge > 0.3
-    assert far == 0
+    assert 0 <= far < 0.06  # by the base, a block's height below
 
 
 def test_a_contact_that_a_rim_cuts_off_is_softer_from_the_first_touch_on(block):
@@ -74,7 +74,13 @@ def test_the_base_holds_what_lies_close_above_it(block):
     assert near < higher < 0
     assert far == 0
     near, higher, far = 0.005 * law.bracing
-    assert near > 0.2 > higher > 0.05 > 0.02 > far >= 0
+    assert near > 0.35 > higher > 0.2 > 0.12 > far > 0.03
+
+
+def test_a_base_braces_less_what_gives_way_in_volume(block):
+    usual, softer, softest = (edge_law(block, *wall(0.009), nu).bracing[0] for nu in (0.49, 0.42, 0.3))
+    assert usual > 1.5 * softer > 0
+    assert softest == 0
 
 
 def test_a_base_close_below_makes_a_dent_harder_the_deeper_it_is(block):
@@ -88,7 +94,7 @@ def test_a_base_close_below_makes_a_dent_harder_the_deeper_it_is(block):
     harder = with_base[:, 1:] / without[:, 1:] - 1
     assert (np.diff(harder[0]) > 0).all()
     assert harder[0, 9] < 0.02 < 0.03 < harder[0, -1] < 0.12
-    assert np.abs(harder[1]).max() < 5e-3
+    assert np.abs(harder[1]).max() < 0.015
 
 
 def test_no_closed_path_over_a_braced_place_gives_work(block):
