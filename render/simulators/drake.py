@@ -2,7 +2,8 @@
 moved by hand between the steps of its SAP solver.
 
 documented: the step, damping and coarse sphere of its deformable example, on the model's own mesh. best:
-edges of a third of the tip's radius under it, a finely meshed sphere, a tenth of the step and of the damping.
+edges of a third of the tip's radius under it, a finely meshed sphere, a tenth of the step, 4 ms of damping:
+with 1 ms the body rings, and contact is lost in a fifth of the samples (6 % with 4; the same force at rest).
 What limits it is the mesh under the tip: with edges of half the radius a shallow press was a sixth harder.
 """
 
@@ -41,7 +42,7 @@ class Settings:
     relaxation_s: float = np.inf
 
 
-SETTINGS = {DOCUMENTED: Settings(1e-2, 1e-2, 1.0), BEST: Settings(1e-3, 1e-3, 0.15, 0.35, 0.1)}
+SETTINGS = {DOCUMENTED: Settings(1e-2, 1e-2, 1.0), BEST: Settings(1e-3, 4e-3, 0.15, 0.35, 0.1)}
 
 
 def vtk_text(mesh: TetMesh) -> str:
@@ -76,7 +77,7 @@ class Drake(SteppedAdapter):
         "--simulator-set sphere_radii=0.15",
         "mesh_stiffness": "refine the body's mesh, and take a Poisson's ratio of 0.45 or below",
         "numerical_damping": "lower stiffness_damping_coefficient and the plant's time_step: "
-        "--simulator-set damping_s=0.001,timestep_s=0.001",
+        "--simulator-set damping_s=0.004,timestep_s=0.001",
         "time_step": "a smaller time_step of the plant: --simulator-set timestep_s=0.001",
         "lost_contact": "a smaller time_step, or more stiffness_damping_coefficient, where the body rings",
     }
