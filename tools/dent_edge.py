@@ -74,12 +74,13 @@ class Prism:
         y = np.random.default_rng(seed).uniform(-0.015, 0.015, len(away))
         turn, (foot, _) = np.radians(self.angle), self.outline[1]
         if part == RIMS:
-            points, normal = [-away, y, np.full(len(away), HEIGHT_M)], UP
+            points = np.column_stack([-away, y, np.full(len(away), HEIGHT_M)])
+            normal = UP
         else:
-            points = [foot + away * np.cos(turn), y, away * np.sin(turn)]
-            normal = [np.sin(turn), 0.0, -np.cos(turn)]
+            points = np.column_stack([foot + away * np.cos(turn), y, away * np.sin(turn)])
+            normal = np.array([np.sin(turn), 0.0, -np.cos(turn)])
         far = np.array([-LENGTH_M / 2, 0.0, HEIGHT_M])
-        return np.vstack([np.column_stack(points), far]), np.vstack([np.tile(normal, (len(away), 1)), UP])
+        return np.vstack([points, far]), np.vstack([np.tile(normal, (len(away), 1)), UP])
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
