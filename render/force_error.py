@@ -25,8 +25,8 @@ RATIO_SHARE, SLIP_SHARE, SLIPPERY = 0.25, 0.03, 0.15
 """Floor; then by a tip radius of depth, by |curvature| times depth, by the surface's way sideways, by how
 near a rim and the base; by Poisson's ratio below the usual one; by slip, a tip radius deep, which fades by
 that coefficient. Of 317 presses at 32 places of eight shapes (`bench law-bound`, seed 41) 4 % lie beyond,
-deep above a base and at the lip of a waist, where the law is 12 % too soft. At 0.3 mm from a block's rim it
-is 18 % too soft a tenth of a radius deep."""
+beside a plate's rim and at the lip of a waist, where the law is up to 13 % too soft. At 0.3 mm from a block's
+rim it is 18 % too soft a tenth of a radius deep."""
 _SURE = 1.96
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
