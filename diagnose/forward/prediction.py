@@ -115,6 +115,7 @@ class Forward:
             modulus=modulus,
             nu=self.model.material.poisson_ratio,
             far=self.places.far,
+            bracing=self.places.bracing,
             dent_ratio=np.ones(p),
             onset=np.zeros(p),
             stiffness=np.ones(p),
@@ -142,13 +143,13 @@ class Forward:
         table = np.array(s.touch.law_of_dent(s.nu).table)
         usual = self.model.material.young_modulus_pa
         compliance = float(s.tool_compliance * s.modulus / usual)
-        arrays = (y, s.far, s.stiffness, s.dent_ratio, table)
+        arrays = (y, s.far, s.bracing, s.stiffness, s.dent_ratio, table)
         tip = self.tip_radius * s.touch.tip_ratio
         key = hash((tip, s.nu, compliance, s.touch.friction, *(a.tobytes() for a in arrays)))
         f = self._kept.get(key)
         if f is None:
             curvature = np.broadcast_to(np.asarray(self.places.curvature, dtype=float), (len(t),))
-            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature, self.places.bracing)
+            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature, s.bracing)
             f = np.zeros_like(y)
             modulus = usual * s.stiffness
             far, mu = np.ascontiguousarray(s.far), float(s.touch.friction)

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from mechanics.compliance.patch import PatchSampler, half_space_compliance
 from mechanics.compliance.pressed_places import UNIFORM, Places
 from mechanics.compliance.sites import PATCH_WIDTH_IN_EDGES, typical_edge
+from mechanics.contact.edges import base_bracing, braced_share
 from mechanics.elastic.elasticity import element_stiffness
 from mechanics.elastic.solver import Solver
 from mechanics.shape.tetmesh import TetMesh
@@ -139,6 +140,17 @@ def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30,
 
     table = places.stage("poisson", lambda: places.stored("poisson", solve))
     return places.far + _interpolate(table["ratios"], table["far"], nu)
+
+
+def bracing_at_poisson(places: Places, nu: float) -> np.ndarray:
+    """(p,) 1/m, the bracing at another Poisson's ratio (mechanics.contact.edges)."""
+
+    def solve() -> np.ndarray:
+        mesh, first = places.model.mesh, places.first
+        return base_bracing(mesh, places.point[first], places.normal[first])[places.place]
+
+    gained = braced_share(nu) - braced_share(places.model.material.poisson_ratio)
+    return places.bracing + gained * places.stage("base bracing", solve)
 
 
 def _sampler(mesh: TetMesh) -> PatchSampler:

@@ -52,9 +52,21 @@ def edge_law(
     known."""
     _, over_base, *fits = fitted()
     amounts = np.stack(fits)
-    amounts[1, over_base] *= np.clip(1 - (USUAL_POISSON_RATIO - poisson_ratio) / _YIELDS, 0.0, 1.0)
+    amounts[1, over_base] *= braced_share(poisson_ratio)
     added, bracing, curvature = (laid(mesh, points, normals) @ amounts.T).T / usual_width(mesh)
     return EdgeLaw(added[:, None, None] * normals[:, :, None] * normals[:, None, :], bracing, curvature)
+
+
+def braced_share(poisson_ratio: float) -> float:
+    """Of the usual Poisson's ratio's `base_bracing`, at another one."""
+    return float(np.clip(1 - (USUAL_POISSON_RATIO - poisson_ratio) / _YIELDS, 0.0, 1.0))
+
+
+def base_bracing(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(k,) 1/m, what the base adds to `EdgeLaw.bracing` of places (k, 3), at the usual Poisson's ratio."""
+    _, over_base, _, amount, _ = fitted()
+    near = laid(mesh, points, normals)[:, over_base]
+    return near @ amount[over_base] / usual_width(mesh)
 
 
 def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.compliance.far_field import far_at_poisson
+from mechanics.compliance.far_field import bracing_at_poisson, far_at_poisson
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
@@ -15,6 +15,7 @@ from mechanics.quantities import POISSON_RATIO
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.nu = float(values[0])
     settings.far = settings.far - scene.places.far + far_at_poisson(scene.places, settings.nu)
+    settings.bracing = bracing_at_poisson(scene.places, settings.nu)
 
 
 def _apply(model: Model, keys: Keys) -> Model:

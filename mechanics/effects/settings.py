@@ -42,17 +42,18 @@ class Touch:
 class Settings:
     """The settings of a prediction; the defaults are the ideal model.
 
-    modulus: Pa. nu: Poisson's ratio. far: (p, 3, 3) local, unit modulus. dent_ratio: (p,) modulus under the
-    tip over the global one. onset: (p,) m, how much earlier each press meets the surface. stiffness: (p,)
-    factor. tool_compliance: m/N, of a spring in series at the stated modulus. unsure_m: (n,) standard
-    deviation of where the tip is, along any axis, or None. moves: where the tip is, (n, 3) m, from where it
-    reads. readings: what is read, (n, 3) N in the device frame, from what is felt; in the
-    order of their numbers.
+    modulus: Pa. nu: Poisson's ratio. far: (p, 3, 3) local, unit modulus. bracing: (p,) 1/m. dent_ratio: (p,)
+    modulus under the tip over the global one. onset: (p,) m, how much earlier each press meets the surface.
+    stiffness: (p,) factor. tool_compliance: m/N, of a spring in series at the stated modulus. unsure_m: (n,)
+    standard deviation of where the tip is, along any axis, or None. moves: where the tip is, (n, 3) m, from
+    where it reads. readings: what is read, (n, 3) N in the device frame, from what is felt; in the order of
+    their numbers.
     """
 
     modulus: float
     nu: float
     far: np.ndarray
+    bracing: np.ndarray
     dent_ratio: np.ndarray
     onset: np.ndarray
     stiffness: np.ndarray
