@@ -257,7 +257,7 @@ def _said(row: dict[str, Any]) -> list[Any]:
     if "failed" in row:
         return [row["case"], row["simulator"], row["settings"], row["failed"], ""]
     over = ", ".join(f"{w} {x:.2f}" for w, x in zip(row["what"], row["over"], strict=True))
-    cost = "" if row["simulator"] == OURS else f"{row['cpu_s']:.2g}"
+    cost = "" if row["simulator"] == OURS else f"{row['cpu_s']:.3g}"
     return [row["case"], row["simulator"], row["settings"], over, cost]
 
 
