@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,6 +16,8 @@ from mechanics.effects.registry import effect, effects
 from mechanics.model.model import Model
 from mechanics.recording.recording import Recording
 
+WORSE = 0.02
+"""Share of the given model's gap by which an improved one's may be larger: two replays of one object."""
 REPLAYS = 2
 """Of the modulus's refit: a force goes with the modulus but for friction and adhesion."""
 
@@ -36,16 +39,16 @@ class Verdict(Protocol):
     def attribution(self) -> Attribution | None: ...
 
 
-def improved(model: Model, diagnosis: Verdict) -> tuple[Model, list[str]]:
-    """(model with the asserted effects, their names). Instrument effects are left out: they must not be
-    rendered.
+def improved(model: Model, diagnosis: Verdict, without: Sequence[str] = ()) -> tuple[Model, list[str]]:
+    """(model with the asserted effects, their names, the strongest first). Instrument effects are left out:
+    they must not be rendered; so are those of `without`.
 
     The modulus, and the dent law that is rendered, are those of the diagnosis's own fit; see
     `with_replayed_modulus`.
     """
     parameters = {e.name: dict(e.parameters) for e in diagnosis.entries}
-    asserted = {name: parameters.get(name, {}) for name in diagnosis.effects}
-    provenance = {**model.provenance, "diagnosed_effects": list(diagnosis.effects)}
+    asserted = {name: parameters.get(name, {}) for name in diagnosis.effects if name not in without}
+    provenance = {**model.provenance, "diagnosed_effects": list(asserted)}
     if diagnosis.attribution is not None:
         # known physics that the fit did without is left out of the model as well
         fitted = diagnosis.attribution.final.found.names
@@ -85,6 +88,48 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
         modulus *= float(np.median(meets[felt] / power[felt]))
         renderer = renderer.with_modulus(modulus)
     return model.with_modulus(modulus)
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """An improved model, and what the renderer's replay of the diagnosed recording says of it.
+
+    given_n, improved_n: N rms of the force's 3-vector while pressing, of the model that was given and of this
+    one. left_out: asserted effects that it does without, as its force would be farther off with them.
+    """
+
+    model: Model
+    given_n: float
+    improved_n: float
+    left_out: tuple[str, ...] = ()
+
+
+def improvement(model: Model, diagnosis: Verdict, recording: Recording) -> Improvement:
+    """The model with the asserted effects, or without those with which its replay is worse than the given
+    model's: a fit may have moved first touches beside an effect, which a renderer cannot.
+
+    recording: read right (`corrected`).
+    """
+    given_n = replayed_gap_n(model, recording)
+    better, rendered = improved(model, diagnosis)
+    left_out: list[str] = []
+    while True:
+        better = with_replayed_modulus(better, recording)
+        gap = replayed_gap_n(better, recording)
+        if not gap > given_n * (1 + WORSE) or not rendered:
+            return Improvement(better, given_n, gap, tuple(left_out))
+        left_out.append(rendered.pop())
+        better, _ = improved(model, diagnosis, without=left_out)
+
+
+def replayed_gap_n(model: Model, recording: Recording) -> float:
+    """N rms of measured less rendered force while pressing; nan where the recording has no press."""
+    from render.fem.renderer import FemRenderer
+    from render.replay import replay_recording, rms_n
+
+    counted = model.presses.touching(recording.t)
+    forces = replay_recording(FemRenderer(model), recording)
+    return rms_n((forces - recording.force_on_tool)[counted])
 
 
 def with_effects(model: Model, named: Mapping[str, Mapping[str, Any]]) -> Model:

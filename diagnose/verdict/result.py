@@ -3,7 +3,7 @@ report."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -144,10 +144,15 @@ class Diagnosis(Result):
 
     def improved(self) -> Model:
         """The model with the object's, contact's and boundary's effects that were named; the instrument's are
-        not the object's and stay out. Its modulus is that at which the renderer meets the recording best."""
+        not the object's and stay out, and so does what makes the replayed force worse (`improvement`). Its
+        modulus is that at which the renderer meets the recording best."""
+        return self.improvement().model
+
+    def improvement(self) -> apply.Improvement:
+        """`improved`, and how far the replayed force of the given and of the improved model is off."""
         assert self.model is not None, "only what `diagnose` returned knows its model"
-        better, _ = apply.improved(self.model, self)
-        return apply.with_replayed_modulus(better, self.corrected()).replaced(path=None)
+        found = apply.improvement(self.model, self, self.corrected())
+        return replace(found, model=found.model.replaced(path=None))
 
     def corrected(self) -> Recording:
         """The recording with the instrument's effects taken off."""

@@ -2,8 +2,11 @@
 
 The compliance that the ball's elements hold is divided by Eshelby's factor of a spherical inclusion in an
 incompressible solid, so that a hard ball does not vanish from the sum: share = 5 (m - 1) / (2 m + 3). That is
-first order, which finds a ball; at a fit it is multiplied, place by place, so that it equals the change of a
-new factorisation there (`refine`). Fitting again moves the ball a little; twice is enough.
+first order, which finds a ball; at a fit it is multiplied, place by place, so that it equals the change that
+a renderer of the ball has there (`refine`), whose mesh is fine around it. Fitting again moves the ball.
+
+A ball lies inside: its radius is at most its centre's depth below the surface. One that broke through would
+have the tip touch it, and first order knows nothing of that.
 """
 
 from __future__ import annotations
@@ -14,17 +17,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mechanics.compliance.far_field import energy_fields
-from mechanics.compliance.patch import PatchSampler
 from mechanics.compliance.pressed_places import Places
-from mechanics.compliance.sites import PATCH_WIDTH_IN_EDGES
+from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from mechanics.contact.edges import edge_law
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import Misfit, SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.elastic.solver import Solver
 from mechanics.model.material import BALL, Ball
 from mechanics.model.model import Model
-from mechanics.model.moduli import inclusion_ratio
-from mechanics.shape.refine import typical_edge
+from mechanics.shape.nearest import closest
 
 RATIO_LIMITS = (0.15, 20.0)
 GRID_M = 0.007
@@ -33,8 +34,10 @@ REACH_M = 0.05
 """From the nearest pressed place: a ball of 15 mm so far off changes a contact's compliance by less than a
 hundredth of it, as strain energy falls with the fourth power of the distance."""
 STARTS = 6
+LEAST_M = 1e-3
+"""Of a ball that lies inside: what is smaller is not felt."""
 _SCALE = "inclusion_scale"
-_SCALE_LIMITS = (0.2, 4.0)
+_SCALE_LIMITS = (0.2, 8.0)
 FOUND = "diagnosed"
 _FAR = 40.0
 """In soft edges beyond a ball: nothing of an element is in it."""
@@ -57,11 +60,29 @@ def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float)
     return share
 
 
+def depths(points: np.ndarray, places: Places) -> np.ndarray:
+    """(k,) m, of points (k, 3) below the nearest surface of the object; negative outside."""
+    mesh = places.model.mesh
+    triangles = mesh.surface[:, :3]
+    foot, index, _ = closest(mesh.points, triangles, points)
+    a, b, c = np.moveaxis(mesh.points[triangles[index]], 1, 0)
+    outwards = np.einsum("kx,kx->k", np.cross(b - a, c - a), points - foot)
+    return np.linalg.norm(points - foot, axis=1) * np.where(outwards > 0, -1.0, 1.0)
+
+
+def inside_object(values: np.ndarray, places: Places) -> np.ndarray:
+    """The values with the radius held to what lies inside the object, so (5,)."""
+    held = np.array(values, dtype=float)
+    held[3] = min(held[3], max(float(depths(held[None, :3], places)[0]), LEAST_M))
+    return held
+
+
 def first_order(values: np.ndarray, places: Places) -> np.ndarray:
     """(p, 3, 3) 1/m, change of each press's compliance, unit modulus; first order in the ball's energy."""
     known: dict[bytes, np.ndarray] = places.stage("balls", dict)
     key = values.tobytes()
     if key not in known:
+        values = inside_object(values, places)
         if len(known) >= _KNOWN:
             del known[next(iter(known))]
         fields = energy_fields(places)
@@ -77,23 +98,35 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
 
 
 def _refine(scene: Scene, values: np.ndarray) -> None:
-    """Hold how much a new factorisation changes each place over what first order says, (p,)."""
-    places = scene.places
-    fields = energy_fields(places)
-    mesh = fields.solver.mesh
-    ratio = inclusion_ratio(mesh, values[:3], float(values[3]), float(np.exp(values[4])))
-    solver = Solver(mesh, places.model.material.poisson_ratio, ratio)
-    sampler = PatchSampler(mesh, PATCH_WIDTH_IN_EDGES * typical_edge(mesh))
-    forces = np.zeros((len(mesh.points), 3, len(places.first)))
-    for k, press in enumerate(places.first):
-        nodes, weights = sampler.weights(places.point[press])
-        forces[nodes, :, k] = weights[:, None] * places.normal[press]
-    compliance = np.einsum("nik,nik->k", forces, solver.solve(forces))
-    exact = (compliance - fields.energy[:, :, 0, 0].sum(axis=1))[places.place]
-    first = first_order(values, places)[:, 0, 0]
+    """Hold how much the ball changes each place, where a mesh fine around it is solved, over what first order
+    says, (p,)."""
+    places, first = scene.places, first_order(values, scene.places)[:, 0, 0]
+    exact = solved_change(ball_of(values, places), places)[places.place]
     known = np.abs(first) > 1e-3 * np.abs(first).max()
     scale = np.where(known, exact / np.where(known, first, 1.0), 1.0)
     places.stages[_SCALE] = np.clip(scale, *_SCALE_LIMITS)
+
+
+def solved_change(ball: Ball, places: Places) -> np.ndarray:
+    """(q,) 1/m, change of each place's normal compliance, unit modulus, under the load that a renderer takes
+    where there are balls."""
+    model = places.model
+    mesh, nu = model.mesh.quadratic(), model.material.poisson_ratio
+    uniform = np.ptp(model.element_ratio) == 0
+    solver = touch_solver(mesh, nu, None if uniform else model.element_ratio, balls=(ball,))
+    point, normal = places.point[places.first], places.normal[places.first]
+    width = patch_width(solver.mesh) if uniform else None
+    patch = LoadPatch(width, model.tool.tip_radius_m)
+    far = touch_sites(mesh, point, normal, nu, solver=solver, curvature=0.0, patch=patch).far
+    if uniform:  # a width that is given leaves edges out
+        far = far + edge_law(mesh, point, normal, nu).far
+    return np.einsum("qi,qij,qj->q", normal, far, normal) - places.far[places.first, 0, 0]
+
+
+def ball_of(values: np.ndarray, places: Places) -> Ball:
+    """The ball that a fit's values (5,) stand for."""
+    x, y, z, radius, log_ratio = map(float, inside_object(values, places))
+    return Ball((x, y, z), radius, float(np.exp(log_ratio)))
 
 
 def _seek(scene: Scene, misfit: Misfit) -> list[np.ndarray]:
@@ -106,11 +139,15 @@ def _seek(scene: Scene, misfit: Misfit) -> list[np.ndarray]:
     fields = energy_fields(places)
     compliance = fields.energy[:, :, 0, 0]
     centres = _centres(fields.centroid, places.point)
-    blur = fields.blur
+    deep, blur = np.maximum(depths(centres, places), LEAST_M), fields.blur
     weight, level = misfit.weight, misfit.level
     found = []
     for radius in RADII_M:
-        share = np.array([inside(fields.centroid, c, radius, blur) for c in centres], dtype=np.float32)
+        held = np.minimum(radius, deep)
+        share = np.array(
+            [inside(fields.centroid, c, r, blur) for c, r in zip(centres, held, strict=True)],
+            dtype=np.float32,
+        )
         pattern = (compliance @ share.T)[places.place] * misfit.answer[:, None]
         for centre, column in zip(centres, pattern.T, strict=True):
             x = np.stack([np.ones_like(column), column], axis=1)
@@ -147,10 +184,11 @@ def _log_ratio(change: float) -> float:
 
 
 def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+    ball = ball_of(values, scene.places)
     return {
-        "centre_m": [float(v) for v in values[:3]],
-        "radius_m": float(values[3]),
-        "modulus_ratio": float(np.exp(values[4])),
+        "centre_m": list(ball.centre_m),
+        "radius_m": ball.radius_m,
+        "modulus_ratio": ball.modulus_ratio,
     }
 
 

@@ -118,9 +118,14 @@ def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
     out.say(*result.lines())
     own: Diagnosis = getattr(result, "reality", result)
     if asked.apply:
-        better = own.improved().save(asked.apply)
+        found = own.improvement()
+        better = found.model.save(asked.apply)
         kept = [name for name in own.effects if name in better.effects]
         out.say(f"improved model ({', '.join(kept) or 'modulus only'}): {asked.apply}")
+        before, after = (f"{1e3 * gap:.3g} mN" for gap in (found.given_n, found.improved_n))
+        out.say(f"  replayed over the recording its force is {after} off, the given model's {before}")
+        for name in found.left_out:
+            out.say(f"  {name.replace('_', ' ')} is left out: with it the replayed force was farther off")
     if asked.corrected:
         own.corrected().save(asked.corrected)
         for name in unsure(own):

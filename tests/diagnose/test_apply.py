@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import json
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import mechanics.compliance.surface_compliance as made
-from diagnose.apply import with_effects, with_replayed_modulus
-from mechanics.compliance.near_field import surface_softness
-from mechanics.compliance.sites import touch_solver
+from diagnose.apply import improvement, with_effects, with_replayed_modulus
+from mechanics.compliance.near_field import sharpening, surface_softness
+from mechanics.compliance.pressed_places import solve_places
+from mechanics.compliance.sites import SURFACE_EDGE_M, touch_solver
+from mechanics.compliance.surface_compliance import surface_compliance
+from mechanics.effects.inclusion import ball_of, first_order, solved_change
 from mechanics.effects.registry import effect
+from mechanics.frames import tangents
 from mechanics.model.files import read_model, write_model
 from mechanics.model.material import Ball
 from render.fem.renderer import FemRenderer
@@ -21,6 +26,7 @@ from render.options import RenderOptions
 UP = np.array([0.0, 0.0, 1.0])
 DEPTH = 0.004
 COARSE_M = 0.05
+TOP = np.array([0.0, 0.0, 0.04])
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -189,3 +195,60 @@ def test_softness_of_the_surface_leaves_balls_out(model):
     assert surface_softness(better.mesh, np.full_like(better.element_ratio, 2.0), points, 0.005) == (
         pytest.approx(0.5)
     )
+
+
+def at_top(model):
+    """The places of one press in the middle of the top."""
+    return solve_places(model, TOP[None], UP[None], np.stack([UP, *tangents(UP)])[None])
+
+
+def test_a_ball_lies_inside_the_object(model):
+    places = at_top(model)
+    deep = np.array([0.0, 0.0, 0.03, 0.025, np.log(6.0)])
+    ball = ball_of(deep, places)
+    assert ball.radius_m == pytest.approx(0.01, abs=1e-6), "10 mm below the top"
+    assert (first_order(deep, places) == first_order(np.array([*deep[:3], 0.01, deep[4]]), places)).all()
+    assert ball_of(np.array([0.0, 0.0, 0.06, 0.01, 0.5]), places).radius_m < 0.002, "outside there is none"
+
+
+@pytest.mark.slow
+def test_a_ball_that_is_fitted_changes_a_place_as_the_rendered_one_does(model):
+    """A ball 6 mm below a tip gives three times what first order in a coarse mesh says."""
+    places, ball = at_top(model), Ball((0.0, 0.0, 0.024), 0.01, 6.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(made, "SURFACE_EDGE_M", SURFACE_EDGE_M)
+        patch.setattr(made, "sharpening", sharpening)
+        patch.setattr(made, "touch_solver", touch_solver)
+        plain, with_ball = (
+            surface_compliance(model.mesh, model.material.poisson_ratio, balls=balls)
+            for balls in ((), (ball,))
+        )
+    own = [table.own[np.linalg.norm(table.own_points - TOP, axis=1).argmin()] for table in (plain, with_ball)]
+    rendered = float(UP @ (own[1] - own[0]) @ UP)
+    values = np.array([*ball.centre_m, ball.radius_m, np.log(ball.modulus_ratio)])
+    assert solved_change(ball, places)[0] == pytest.approx(rendered, rel=0.1)
+    assert abs(first_order(values, places)[0, 0, 0]) < 0.5 * abs(rendered)
+
+
+class Named:
+    """A diagnosis that asserts a ball, and nothing of how it was found."""
+
+    def __init__(self, model, ball):
+        entry = SimpleNamespace(name="inclusion", parameters=ball)
+        self.effects, self.entries, self.attribution = ("inclusion",), (entry,), None
+        self.young_modulus_pa = model.material.young_modulus_pa
+
+
+@pytest.mark.parametrize(("gap_n", "kept"), [(0.03, True), (0.28, False)])
+def test_what_makes_the_replayed_force_worse_is_left_out(bench, model, monkeypatch, gap_n, kept):
+    """A ball whose rendered force is farther off than the one without it is no improvement."""
+    ball = {"centre_m": [0.012, 0.0, 0.026], "radius_m": 0.011, "modulus_ratio": 6.0}
+    replayed = {True: gap_n, False: 0.05}
+    monkeypatch.setattr("diagnose.apply.with_replayed_modulus", lambda model, recording: model)
+    monkeypatch.setattr(
+        "diagnose.apply.replayed_gap_n", lambda model, recording: replayed["inclusion" in model.effects]
+    )
+    found = improvement(model, Named(model, ball), bench.record()[0])
+    assert ("inclusion" in found.model.effects) == kept
+    assert found.left_out == (() if kept else ("inclusion",))
+    assert (found.given_n, found.improved_n) == (0.05, min(gap_n, 0.05))

@@ -95,6 +95,8 @@ def test_ideal_values_change_nothing_and_starts_do(forward, name):
         start[1] = 0.1
     if name == "tool_gravity_inertia":
         start[:] = (0.05, 1.0)
+    if name == "inclusion":
+        start[:3] = (0.0, 0.0, 0.02)  # where a ball lies inside
     moved = forward.predict(settings_of(forward, [chosen], np.concatenate([[np.log(MODULUS)], start])))
     assert np.abs(moved - ideal).max() > 1e-3 * scale
     assert set(chosen.report(start, forward, MODULUS)) == CONTRACT[name]

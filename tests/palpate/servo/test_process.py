@@ -232,13 +232,18 @@ time.sleep(600.0)
 
 @pytest.mark.parametrize("when", ["loading", "touching"])
 def test_a_servo_whose_parent_was_killed_ends_though_its_input_does_not(when):
-    parent = subprocess.Popen([sys.executable, "-c", FORKING, when], stdout=subprocess.PIPE)
+    parent = subprocess.Popen(
+        [sys.executable, "-c", FORKING, when], stdout=subprocess.PIPE, start_new_session=True
+    )
     assert parent.stdout is not None
     process_id = int(parent.stdout.readline())
     assert process_runs(process_id)
-    parent.kill()
-    parent.wait()
-    assert eventually(lambda: not process_runs(process_id))
+    os.kill(parent.pid, signal.SIGKILL)
+    try:
+        assert eventually(lambda: not process_runs(process_id))
+    finally:
+        os.killpg(parent.pid, signal.SIGKILL)  # and the one that it forked
+        parent.wait()
 
 
 def test_a_servo_that_outlives_its_window_ends_with_its_force(fake):
@@ -318,9 +323,9 @@ def test_a_stopped_window_takes_the_force_with_it(fake):
     try:
         assert eventually(lambda: pressing(fake))
         os.kill(parent.pid, signal.SIGSTOP)
-        # of a stopped parent's silence the servo knows by its own clock, while it goes on
-        assert eventually(lambda: fake.commanded_n == [0.0, 0.0, 0.0])
-        assert goes_on_without_force(fake) and process_runs(process_id)
+        # of a stopped parent's silence the servo knows by its own clock, while it goes on; a pose that came
+        # late on a busy machine takes the force before that, and gives it back
+        assert eventually(lambda: goes_on_without_force(fake)) and process_runs(process_id)
         os.kill(parent.pid, signal.SIGCONT)
         assert eventually(lambda: pressing(fake)), "a window that goes on is felt again"
     finally:
