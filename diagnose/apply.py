@@ -17,7 +17,7 @@ from mechanics.model.model import Model
 from mechanics.recording.recording import Recording
 
 WORSE = 0.02
-"""Share of the given model's gap by which an improved one's may be larger: two replays of one object."""
+"""Share of the given model's gap: replays that differ by less are alike."""
 REPLAYS = 2
 """Of the modulus's refit: a force goes with the modulus but for friction and adhesion."""
 
@@ -40,8 +40,8 @@ class Verdict(Protocol):
 
 
 def improved(model: Model, diagnosis: Verdict, without: Sequence[str] = ()) -> tuple[Model, list[str]]:
-    """(model with the asserted effects, their names, the strongest first). Instrument effects are left out:
-    they must not be rendered; so are those of `without`.
+    """(model with the asserted effects, their names). Instrument effects are left out: they must not be
+    rendered; so are those of `without`.
 
     The modulus, and the dent law that is rendered, are those of the diagnosis's own fit; see
     `with_replayed_modulus`.
@@ -111,15 +111,17 @@ def improvement(model: Model, diagnosis: Verdict, recording: Recording) -> Impro
     recording: read right (`corrected`).
     """
     given_n = replayed_gap_n(model, recording)
-    better, rendered = improved(model, diagnosis)
-    left_out: list[str] = []
-    while True:
-        better = with_replayed_modulus(better, recording)
-        gap = replayed_gap_n(better, recording)
-        if not gap > given_n * (1 + WORSE) or not rendered:
-            return Improvement(better, given_n, gap, tuple(left_out))
-        left_out.append(rendered.pop())
-        better, _ = improved(model, diagnosis, without=left_out)
+
+    def without(names: Sequence[str]) -> Improvement:
+        better = with_replayed_modulus(improved(model, diagnosis, names)[0], recording)
+        return Improvement(better, given_n, replayed_gap_n(better, recording), tuple(names))
+
+    rendered, found = improved(model, diagnosis)[1], without(())
+    while found.improved_n > given_n * (1 + WORSE) and rendered:
+        tried = [without((*found.left_out, name)) for name in rendered]
+        found = min(tried, key=lambda each: each.improved_n)
+        rendered.remove(found.left_out[-1])
+    return found
 
 
 def replayed_gap_n(model: Model, recording: Recording) -> float:

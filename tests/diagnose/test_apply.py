@@ -231,11 +231,12 @@ def test_a_ball_that_is_fitted_changes_a_place_as_the_rendered_one_does(model):
 
 
 class Named:
-    """A diagnosis that asserts a ball, and nothing of how it was found."""
+    """A diagnosis that asserts a ball and a tip that slips, and nothing of how they were found."""
 
     def __init__(self, model, ball):
-        entry = SimpleNamespace(name="inclusion", parameters=ball)
-        self.effects, self.entries, self.attribution = ("inclusion",), (entry,), None
+        found = {"inclusion": ball, "friction_slip": {"mu": 0.2}}
+        self.effects, self.attribution = tuple(found), None
+        self.entries = tuple(SimpleNamespace(name=name, parameters=keys) for name, keys in found.items())
         self.young_modulus_pa = model.material.young_modulus_pa
 
 
@@ -249,6 +250,6 @@ def test_what_makes_the_replayed_force_worse_is_left_out(bench, model, monkeypat
         "diagnose.apply.replayed_gap_n", lambda model, recording: replayed["inclusion" in model.effects]
     )
     found = improvement(model, Named(model, ball), bench.record()[0])
-    assert ("inclusion" in found.model.effects) == kept
+    assert ("inclusion" in found.model.effects) == kept and "friction_slip" in found.model.effects
     assert found.left_out == (() if kept else ("inclusion",))
     assert (found.given_n, found.improved_n) == (0.05, min(gap_n, 0.05))
