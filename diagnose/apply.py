@@ -127,11 +127,9 @@ def improvement(model: Model, diagnosis: Verdict, recording: Recording) -> Impro
 def replayed_gap_n(model: Model, recording: Recording) -> float:
     """N rms of measured less rendered force while pressing; nan where the recording has no press."""
     from render.fem.renderer import FemRenderer
-    from render.replay import replay_recording, rms_n
+    from render.replay import replay_error, replay_recording
 
-    counted = model.presses.touching(recording.t)
-    forces = replay_recording(FemRenderer(model), recording)
-    return rms_n((forces - recording.force_on_tool)[counted])
+    return replay_error(recording, model.presses, replay_recording(FemRenderer(model), recording)).rmse_n
 
 
 def with_effects(model: Model, named: Mapping[str, Mapping[str, Any]]) -> Model:
