@@ -43,6 +43,7 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
         answer.candidates[:0] = answer.names
         answer.names, answer.remainder, after_n = [], True, before_n
         answer.reasons.append("the gap grows with what would be named on places that were not fitted")
+    answer.reasons += _with_all_places(findings, answer, gaps, counts, closed)
     if not answer.names:
         closed, interval = (0.0, (0.0, 0.0)) if before_n > noise else (None, None)
     residual_before = found.ideal.residual + findings.instrument_offsets.residual
@@ -75,6 +76,24 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
     )  # fmt: skip
     lap("verdict")
     return result
+
+
+def _with_all_places(
+    findings: Findings, answer: Answer, gaps: Gaps, counts: np.ndarray, closed: float | None
+) -> list[str]:
+    """What a lump closes where the places above it are in the fit, where that is more: to the other places
+    it is unknown, so places left out say little of it."""
+    lumps = [n for n in answer.names if effect(n).hints.few_places]
+    if not lumps or closed is None:
+        return []
+    t, after = findings.forward.touches, findings.found.final.fitted_plain
+    noise_n, rng = findings.noise_n, np.random.default_rng(findings.seed)
+    share, _ = closed_share(gaps.before, after, counts, noise_n, t.thinned_away, rng, 1)
+    if share is None or share <= closed:
+        return []
+    name = lumps[0].replace("_", " ")
+    why = f"few of them lie above the {name}, and the others say nothing of it"
+    return [f"fitted to all places it is {share:.0%}: {why}"]
 
 
 def _errors(findings: Findings) -> dict[str, float]:
