@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+import tomllib
 from collections import defaultdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,11 @@ from tools.script import script
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the judged cases are."""
     add_opened_arguments(parser, SURENESS_FILE)
+    parser.add_argument(
+        "--earlier",
+        metavar="TOML",
+        help="counts of cases judged before, to be added: some standings are rare",
+    )
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -40,6 +47,12 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             count[1] += weight
     if not counts:
         raise OptionError(f"{arguments.work}: no judged cases there; run `palpate bench diagnose` first")
+    if arguments.earlier:
+        for how, known in tomllib.loads(Path(arguments.earlier).read_text(encoding="utf-8")).items():
+            for role, (right, of) in known.items():
+                count = counts[how][role]
+                count[0] += right
+                count[1] += of
     print(table(["standing", "role", "true", "of"], [
         [how, role, f"{right:.0f}", f"{of:.1f}"]
         for how, each in sorted(counts.items()) for role, (right, of) in sorted(each.items())]))  # fmt: skip
