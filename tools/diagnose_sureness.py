@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--earlier",
         metavar="TOML",
-        help="counts of cases judged before, to be added: some standings are rare",
+        help="counts of cases judged before, to be added (some standings are rare)",
     )
 
 
