@@ -151,7 +151,11 @@ def _figures(rows: list[dict[str, Any]]) -> list[Figure]:
         )
         for name in dict.fromkeys(r["simulator"] for r in others)
     ]
-    return [*over, *costs, *(f.at_most(LONGEST_S) for f in whole)]
+    ended = [
+        Figure(f"{r['case']}, {r['simulator']}, {r['settings']}: ended without a force", 1.0, unit="1")
+        for r in rows if "failed" in r
+    ]  # fmt: skip
+    return [*over, *costs, *(f.at_most(LONGEST_S) for f in whole), *ended]
 
 
 class _Kept:

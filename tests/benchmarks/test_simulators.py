@@ -1,6 +1,7 @@
 """The conformance table: the path of a press, and our own renderer against closed forms."""
 
 import argparse
+import json
 
 import numpy as np
 import pytest
@@ -38,6 +39,14 @@ def test_runs_at_several_times_make_one_table_and_a_page(tmp_path, monkeypatch):
     assert any(f.what == "slab, scikit-fem, documented: 1 mm over truth" for f in found["figures"])
     assert next(f for f in found["figures"] if f.what == "all cases that were run, scikit-fem").met
     assert "scikit-fem" in (tmp_path / "p.html").read_text()
+
+
+def test_a_run_without_a_force_stands_in_the_figures(tmp_path):
+    row = {"case": "slab", "simulator": "drake", "settings": "best", "failed": "an element is degenerate"}
+    (tmp_path / "rows").mkdir()
+    (tmp_path / "rows" / "slab_drake_best.json").write_text(json.dumps(row))
+    found = run(tmp_path, "--kept")
+    assert [f.what for f in found["figures"]] == ["slab, drake, best: ended without a force"]
 
 
 @pytest.mark.slow
