@@ -43,9 +43,9 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
         answer.candidates[:0] = answer.names
         answer.names, answer.remainder, after_n = [], True, before_n
         answer.reasons.append("the gap grows with what would be named on places that were not fitted")
-    answer.reasons += _with_all_places(findings, answer, gaps, counts, closed)
     if not answer.names:
         closed, interval = (0.0, (0.0, 0.0)) if before_n > noise else (None, None)
+    answer.reasons += _with_all_places(findings, answer, gaps, counts, closed)
     residual_before = found.ideal.residual + findings.instrument_offsets.residual
     result = Diagnosis(
         noise_n=noise,
