@@ -30,7 +30,7 @@ from diagnose.other_simulator.result import Part, SimulatedGap, Simulator
 from diagnose.other_simulator.sizes import sizes_alone
 from diagnose.other_simulator.stated import Stated
 from diagnose.pipeline import diagnose, with_tip_of
-from diagnose.search.gaps import closed_share
+from diagnose.search.gaps import closed_share_ci95
 from diagnose.verdict.answer import Answer, Findings
 from diagnose.verdict.result import Diagnosis, EffectEntry
 from diagnose.verdict.where import locate
@@ -163,8 +163,8 @@ def _concluded(w: _Weighed) -> SimulatedGap:
     }
     explained = sum(p.share for p in parts.values())
     after, counts = _after(w), weighing.counts
-    closed, interval = closed_share(
-        weighing.squares(w.gaps["simulated"]), after, counts, reality.noise_n, weighing.added,
+    closed, interval = closed_share_ci95(
+        weighing.squares(w.gaps["simulated"]), after, counts, reality.noise_n**2 - weighing.added,
         np.random.default_rng(w.seed), w.resamples,
     )  # fmt: skip
     names = _by_size(w)
@@ -246,8 +246,8 @@ def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:
 
     def entry(name: str, domain: str, probability: float, gap: np.ndarray, keys: dict, **more: Any) -> Any:
         after = weighing.squares(gap)
-        closed, interval = closed_share(
-            before, after, weighing.counts, weighing.noise_n, weighing.added, rng, 100
+        closed, interval = closed_share_ci95(
+            before, after, weighing.counts, weighing.noise_n**2 - weighing.added, rng, 100
         )
         return EffectEntry(name, domain, probability, weighing.gap_n(gap), closed, interval, keys, **more)
 

@@ -12,7 +12,7 @@ from diagnose.forward.prediction import Forward
 from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.descent import Descent, fit
 from diagnose.search.fit import Fit, settings_of
-from diagnose.search.gaps import lower_closure, share_closed
+from diagnose.search.gaps import closed_share, lower_closure
 from diagnose.search.leave_one_out import Candidate, held_out
 from diagnose.search.naming import Score
 from diagnose.search.starts import first_touches
@@ -107,7 +107,7 @@ class Search:
         noise = 3 * t.noise_n**2
         least = self.smallest_n**2
         samples = self.whitener.counts()
-        share = float(share_closed(was, left, samples, noise, least))
+        share = float(closed_share(was, left, samples, noise, least))
         closes = lower_closure(was, left, samples, noise, least, self.options.doubt)
         return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
 

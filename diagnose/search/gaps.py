@@ -24,25 +24,37 @@ def closed_share(
     after: np.ndarray,
     counts: np.ndarray,
     noise: float,
-    added: float,
+    least: float = 0.0,
+    axis: int = -1,
+) -> np.ndarray:
+    """The share of the held-out gap's excess over the noise that is closed; NaN where it has no excess.
+
+    before, after: (..., g) N^2, sums of squares of each place; counts: (..., g) samples; noise: N^2, mean
+    square of a sample's noise; least: N^2, what a gap that matters exceeds it by: a smaller one is not closed
+    by less.
+    """
+    n = counts.sum(axis=axis)
+    excess = np.maximum(before.sum(axis=axis) / n - noise, least)
+    return (before - after).sum(axis=axis) / n / np.where(excess > 0, excess, np.nan)
+
+
+def closed_share_ci95(
+    before: np.ndarray,
+    after: np.ndarray,
+    counts: np.ndarray,
+    noise: float,
     rng: np.random.Generator,
     resamples: int,
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """(share of the gap's excess over the noise that is closed, 95 % interval by resampling sites).
-
-    before, after, counts: (g,) a site's sums of squares, N^2, and samples. noise: N, of the 3-vector. None
-    where the gap before is within the noise; such resamples are passed over.
-    """
-
-    def share(old: np.ndarray, new: np.ndarray, number: np.ndarray, axis: int = -1) -> np.ndarray:
-        n = number.sum(axis=axis)
-        b = old.sum(axis=axis) / n + added - noise**2
-        a = new.sum(axis=axis) / n + added - noise**2
-        return 1 - a / np.where(b > 0, b, np.nan)
-
-    value = float(share(before, after, counts))
+    """(`closed_share`, its 95 % interval by resampling places), (None, None) where the gap before is within
+    the noise; such resamples are passed over."""
+    value = float(closed_share(before, after, counts, noise))
     if not np.isfinite(value):
         return None, None
+
+    def share(old: np.ndarray, new: np.ndarray, number: np.ndarray, axis: int = -1) -> np.ndarray:
+        return closed_share(old, new, number, noise, axis=axis)
+
     draws = resampled((before, after, counts), share, resamples, rng)
     low, high = np.nanquantile(draws, [0.025, 0.975])
     return value, (float(low), float(high))
@@ -60,27 +72,13 @@ def resampled(
     return statistic(*(values[drawn] for values in sites), axis=-1)
 
 
-def share_closed(
-    before: np.ndarray, after: np.ndarray, counts: np.ndarray, noise: float, least: float, axis: int = -1
-) -> np.ndarray:
-    """The share of the held-out gap that is closed.
-
-    before, after: (..., g) N^2, sums of squares of each place; counts: (..., g) samples; noise: N^2, mean
-    square of a sample's noise; least: N^2, what a gap that matters exceeds it by: a smaller one is not closed
-    by less.
-    """
-    n = counts.sum(axis=axis)
-    gap = np.maximum(before.sum(axis=axis) / n - noise, least)
-    return (before - after).sum(axis=axis) / n / gap
-
-
 def lower_closure(
     before: np.ndarray, after: np.ndarray, counts: np.ndarray, noise: float, least: float, doubt: float
 ) -> float:
-    """`share_closed` in all but a share `doubt` of the resamplings of the places, at least."""
+    """`closed_share` in all but a share `doubt` of the resamplings of the places, at least."""
 
     def share(old: np.ndarray, new: np.ndarray, number: np.ndarray, axis: int = -1) -> np.ndarray:
-        return share_closed(old, new, number, noise, least, axis)
+        return closed_share(old, new, number, noise, least, axis)
 
     draws = resampled((before, after, counts), share, RESAMPLES, np.random.default_rng(0))
     return float(np.quantile(draws, doubt))

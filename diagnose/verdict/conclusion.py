@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from diagnose.search.detectable import detectable
-from diagnose.search.gaps import closed_share, gap
+from diagnose.search.gaps import closed_share, closed_share_ci95, gap
 from diagnose.search.intervals import parameter_intervals
 from diagnose.search.rivals import alike
 from diagnose.search.site_stiffness import repeat_scatter
@@ -37,7 +37,9 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
     gaps = dataclasses.replace(gaps, after=without_what_makes_it_worse(findings, answer, gaps, counts))
     before_n = gap(gaps.before, counts, added)
     after_n = gap(gaps.after, counts, added) if answer.names else before_n
-    closed, interval = closed_share(gaps.before, gaps.after, counts, noise, added, rng, findings.bootstrap)
+    closed, interval = closed_share_ci95(
+        gaps.before, gaps.after, counts, noise**2 - added, rng, findings.bootstrap
+    )
     if answer.names and interval is not None and interval[1] < 0:
         # resamples of the share may say what those of the growth left open: then nothing is named either
         answer.candidates[:0] = answer.names
@@ -87,9 +89,8 @@ def _with_all_places(
     if not lumps or closed is None:
         return []
     t, after = findings.forward.touches, findings.found.final.fitted_plain
-    noise_n, rng = findings.noise_n, np.random.default_rng(findings.seed)
-    share, _ = closed_share(gaps.before, after, counts, noise_n, t.thinned_away, rng, 1)
-    if share is None or share <= closed:
+    share = float(closed_share(gaps.before, after, counts, findings.noise_n**2 - t.thinned_away))
+    if not share > closed:
         return []
     name = lumps[0].replace("_", " ")
     why = f"few of them lie above the {name}, and the others say nothing of it"
@@ -131,7 +132,7 @@ def entries_of(
         return sureness(name, how_named(name, answer.names, answer.candidates, answer.kind), scored)
 
     def closed_by(plain: np.ndarray, draws: int) -> tuple[float | None, tuple[float, float] | None]:
-        return closed_share(gaps.before, plain, counts, noise, added, rng, draws)
+        return closed_share_ci95(gaps.before, plain, counts, noise**2 - added, rng, draws)
 
     entries = []
     for name, score in found.scores.items():
