@@ -67,7 +67,7 @@ class Rigid:
     def words(self) -> str:
         """What is read sideways, for a reason."""
         share = float(np.linalg.norm(self.sideways))
-        return f"on the rigid support {share:.0%} of the force along its normal is read sideways"
+        return f"on the rigid support {100 * share:.0f} % of the force along its normal is read sideways"
 
     @property
     def words_of_play(self) -> str:

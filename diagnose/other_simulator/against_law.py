@@ -112,8 +112,8 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
     missed = float(np.sqrt((best.residual[t.counted] ** 2).sum(axis=1).mean()))
     remainder = left > rules.unknown_chi and missed > LEAST_SHARE * typical
     reasons = [
-        f"{n.replace('_', ' ')}: within the {COMMON_ERROR:.0%} that our own law may be off everywhere, "
-        "so it is not named" for n in ratio_only
+        f"{n.replace('_', ' ')}: within the {100 * COMMON_ERROR:.0f} % that our own law may be off "
+        "everywhere, so it is not named" for n in ratio_only
     ]  # fmt: skip
     if remainder:
         reasons.append(

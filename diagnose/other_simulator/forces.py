@@ -136,8 +136,9 @@ def _same_time(t: np.ndarray, presses: Presses) -> None:
         return
     first = float(presses.t[0])
     raise OptionError(
-        f"the simulated forces run from {t[0]:.6g} to {t[-1]:.6g} s, and {1 - inside:.0%} of the presses lie "
-        f"outside (they begin at {first:.6g} s): state --clock-offset, s, which is added to the file's clock"
+        f"the simulated forces run from {t[0]:.6g} to {t[-1]:.6g} s, and {100 * (1 - inside):.0f} % of the "
+        f"presses lie outside (they begin at {first:.6g} s): state --clock-offset, s, "
+        "which is added to the file's clock"
     )
 
 

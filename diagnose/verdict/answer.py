@@ -115,7 +115,7 @@ def _slipping(findings: Findings, answer: Answer) -> None:
     if off and not set(slips) & set(answer.names):
         answer.candidates[:0] = slips
         answer.remainder = True
-        answer.reasons.append(f"the sideways force is off by {off:.0%} of itself: the tip may slip")
+        answer.reasons.append(f"the sideways force is off by {100 * off:.0f} % of itself: the tip may slip")
 
 
 def _finite_strain(findings: Findings, answer: Answer) -> None:

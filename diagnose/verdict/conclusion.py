@@ -94,7 +94,7 @@ def _with_all_places(
         return []
     name = lumps[0].replace("_", " ")
     why = f"few of them lie above the {name}, and the others say nothing of it"
-    return [f"fitted to all places it is {share:.0%}: {why}"]
+    return [f"fitted to all places it is {100 * share:.0f} %: {why}"]
 
 
 def _errors(findings: Findings) -> dict[str, float]:

@@ -46,8 +46,8 @@ def _first(result: Material) -> str:
     doubts = []
     if result.beyond_constant:
         doubts.append(
-            f"NO ANSWER: held-out errors of {result.missed:.0%} exceed the "
-            f"{result.error['constant']:.0%} of a constant"
+            f"NO ANSWER: held-out errors of {100 * result.missed:.0f} % exceed the "
+            f"{100 * result.error['constant']:.0f} % of a constant"
         )
     elif result.beaten_by is not None:
         doubts.append(f"{result.beaten_by} predicts held-out data better")
