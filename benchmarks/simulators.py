@@ -154,6 +154,12 @@ def _figures(rows: list[dict[str, Any]]) -> list[Figure]:
     ended = [
         Figure(f"{r['case']}, {r['simulator']}, {r['settings']}: ended without a force", 1.0, unit="1")
         for r in rows if "failed" in r
+    ] + [
+        Figure(
+            f"{r['case']}, {r['simulator']}, {r['settings']}: presses that ended without a force",
+            len(r["ended"]), unit="presses",
+        )
+        for r in rows if r.get("ended")
     ]  # fmt: skip
     return [*over, *costs, *(f.at_most(LONGEST_S) for f in whole), *ended]
 
@@ -235,12 +241,17 @@ class _Recorded:
         """The fields of a row."""
         from render.replay import replay_touches
 
-        presses = self.presses
-        force = replay_touches(touched, self.recording, presses, self.chosen)
+        presses, errors = self.presses, {}
+        force = replay_touches(
+            touched, self.recording, presses, self.chosen, failed=lambda p, error: errors.update({p: error})
+        )
+        chosen = [p for p in np.flatnonzero(self.chosen) if p not in errors]
+        if not chosen:
+            raise next(iter(errors.values()))
         at = np.column_stack([np.interp(presses.t, self.recording.t, f) for f in force.T])
         push = np.einsum("ni,ni->n", at, presses.normal[presses.press])
         truth = presses.net.push
-        parts = [presses.parts[k] for k in np.flatnonzero(self.chosen)]
+        parts = [presses.parts[k] for k in chosen]
         peaks = [(float(push[p].max()), float(truth[p].max())) for p in parts]
         deepest = max(parts, key=lambda p: presses.travel[p, 0].max())
         until = slice(deepest.start, deepest.start + int(np.argmax(presses.travel[deepest, 0])) + 1)
@@ -250,6 +261,7 @@ class _Recorded:
             "over": [float(np.median([a / b for a, b in peaks]))],
             "curve": [(1e3 * presses.travel[until, 0]).tolist(), push[until].tolist(), truth[until].tolist()],
             "samples": int(sum(p.stop - p.start for p in parts)),
+            "ended": [str(error) for error in errors.values()],
         }
 
 
@@ -261,6 +273,8 @@ def _said(row: dict[str, Any]) -> list[Any]:
     if "failed" in row:
         return [row["case"], row["simulator"], row["settings"], row["failed"], ""]
     over = ", ".join(f"{w} {x:.2f}" for w, x in zip(row["what"], row["over"], strict=True))
+    if row.get("ended"):
+        over += f"; {len(row['ended'])} presses ended without a force ({row['ended'][0]})"
     cost = "" if row["simulator"] == OURS else f"{row['cpu_s']:.3g}"
     return [row["case"], row["simulator"], row["settings"], over, cost]
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mechanics.effects.friction_slip import EFFECT as SLIP
-from mechanics.errors import OptionError
+from mechanics.errors import OptionError, PalpateError
 from mechanics.key_values import number, pairs, words_of
 from mechanics.model.model import Model
 from mechanics.shape.refine import refined_around
@@ -206,14 +206,35 @@ class SimulatorRenderer(Renderer):
     def step(self, state: SimulatedState, tips: np.ndarray) -> tuple[SimulatedState, np.ndarray]:
         near = self._tree.query(np.asarray(tips, dtype=float))[0] - state.radii_m
         for i, tip in enumerate(np.asarray(tips, dtype=float)):
-            world = state.world[i]
-            if world is None and near[i] < NEAR_M:
-                world = state.world[i] = self.adapter.begin(tip, float(state.radii_m[i]))
-            elif world is not None and near[i] > AWAY_M:
-                world = state.world[i] = None
-            state.forces[i] = 0.0 if world is None else world.step(float(state.dt_s[0]), tip)
+            state.forces[i] = self._force(state, i, tip, near[i])
             state.touching[i] = int(state.forces[i].any())
         return state, state.forces
+
+    def _force(self, state: SimulatedState, i: int, tip: np.ndarray, near_m: float) -> np.ndarray | float:
+        """(3,) N on tip i at (3,) m, near_m off the object. Raises OptionError where the simulator ends in an
+        error of its own, or its force is no number; the touch is over then."""
+        world, state.world[i] = state.world[i], None
+        if (world is None and near_m >= NEAR_M) or near_m > AWAY_M:
+            return 0.0
+        try:
+            if world is None:
+                world = self.adapter.begin(tip, float(state.radii_m[i]))
+            force = world.step(float(state.dt_s[0]), tip)
+        except PalpateError:
+            raise
+        except Exception as error:  # another's code may raise anything
+            raise self._ended(tip, str(error).strip().split("\n")[0] or type(error).__name__) from error
+        if not np.isfinite(force).all():
+            raise self._ended(tip, "its force is no number")
+        state.world[i] = world
+        return force
+
+    def _ended(self, tip: np.ndarray, why: str) -> OptionError:
+        numbers = ", ".join(sorted(f.name for f in dataclasses.fields(self.adapter.own)))
+        return OptionError(
+            f"{self.name} ended with the tip at {np.round(tip, 4).tolist()} m: {why}: try a coarser mesh or "
+            f"a shorter step, --simulator-set KEY=VALUE of {numbers}"
+        )
 
     def follow(self, state: SimulatedState, path: np.ndarray, steps_s: np.ndarray) -> np.ndarray:
         forces = np.zeros(np.shape(path))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
@@ -10,12 +13,12 @@ from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool
 from mechanics.progress import silent
 from mechanics.shape.box_mesh import box_mesh
-from render.options import RenderOptions
+from render.options import DOCUMENTED, RenderOptions
 from render.press import Stroke, press
 from render.registry import create, names, simulator_names
 from render.replay import replay
 from render.scene import in_the_air
-from render.simulators.base import SteppedWorld
+from render.simulators.base import Adapter, SimulatorRenderer, SteppedWorld
 
 E, NU, RADIUS = 30e3, 0.4, 0.006
 
@@ -121,6 +124,46 @@ def test_a_stepping_simulator_is_led_in_whole_steps_of_its_own():
     assert world.step(1e-3, np.array([0.0, 0.0, 0.1]))[2] == 0  # not a step's time yet
     assert world.step(5e-3, np.array([0.0, 0.0, 0.3]))[2] == 3
     assert world.tips == pytest.approx((0.1, 0.2, 0.3))
+
+
+@dataclass(frozen=True)
+class Numbers:
+    edge_radii: float = 1.0
+
+
+class Dying(Adapter):
+    """A spring until the tip is 1 mm deep, where it does as it is told."""
+
+    name, units, cannot, advice, extra = "dying", "SI", (), {}, "none"
+    settings: ClassVar = {DOCUMENTED: Numbers()}
+    end = staticmethod(lambda: np.zeros(3))
+
+    def begin(self, tip, radius_m):
+        return self
+
+    def step(self, dt_s, tip):
+        depth = 0.024 + RADIUS - tip[2]
+        return self.end() if depth > 1e-3 else np.array([0.0, 0.0, 1e3 * max(depth, 0.0)])
+
+
+def crash():
+    raise RuntimeError("A mesh field element was degenerate\n  in file mesh.cc")
+
+
+@pytest.mark.parametrize(
+    ("end", "why"),
+    [(crash, "element was degenerate: try"), (lambda: np.full(3, np.nan), "its force is no number: try")],
+)
+def test_what_another_simulator_dies_of_is_said_in_one_line(model, monkeypatch, end, why):
+    monkeypatch.setattr(Dying, "end", staticmethod(end))
+    renderer = SimulatorRenderer("dying", model, Dying, RenderOptions())
+    state = renderer.start()
+    tips = [np.array([[0.0, 0.0, 0.024 + RADIUS - depth]]) for depth in (-1e-4, 5e-4, 1.5e-3)]
+    forces = [renderer.step(state, tip)[1][0, 2] for tip in tips[:2]]
+    assert forces == pytest.approx([0.0, 0.5])
+    with pytest.raises(OptionError, match=f"dying ended with the tip at .*{why} .*KEY=VALUE of edge_radii$"):
+        renderer.step(state, tips[2])
+    assert state.world == [None]
 
 
 def test_a_setting_that_is_not_there_is_refused(model):
