@@ -30,7 +30,8 @@ class Attribution:
     base: what effects were added to (finite strain in it where the data prefer it). ideal: linear elasticity
     alone; deep: neo-Hookean alone. scores: of every single effect on the base. chosen: names, strongest
     first. rivals: names not told apart from a chosen one. final: the chosen set. steps, picked: what each
-    step looked like and what it took. finite_strain_gain: log likelihood, in the final set. confidence_set_p:
+    step looked like and what it took. finite_strain_gain: log likelihood, in the final set;
+    finite_strain_closes: N^2, by how much it lowers there the sum of held-out squares. confidence_set_p:
     p value by which each effect, and 'none', is in the first step's model confidence set.
     """
 
@@ -44,6 +45,7 @@ class Attribution:
     steps: tuple[dict[str, Score], ...]
     picked: tuple[str, ...]
     finite_strain_gain: float
+    finite_strain_closes: float
     confidence_set_p: dict[str, float]
 
 
@@ -60,7 +62,7 @@ def attribute(
     """
     fs = search.finite_strain
     ideal, deep = search.judge([]), search.judge([fs])
-    _, strain_gain = _with_strain(search, [])
+    _, strain_gain, strain_closes = _with_strain(search, [])
     base = deep if strain_gain > -search.options.beyond_doubt else ideal
     current = base
     chosen: list[str] = []
@@ -101,7 +103,7 @@ def attribute(
                 break
             chosen += [n for n in pair.found.names if n not in current.found.names]
             search.renew(pair.found)
-            current, strain_gain = _with_strain(search, pair.found.effects)
+            current, strain_gain, strain_closes = _with_strain(search, pair.found.effects)
             break
         best = _likeliest(passing, search.options.beyond_doubt)
         for effect in effects:
@@ -113,7 +115,7 @@ def attribute(
         )
         chosen.append(best.name)
         search.renew(best.candidate.found)
-        current, strain_gain = _with_strain(search, best.candidate.found.effects)
+        current, strain_gain, strain_closes = _with_strain(search, best.candidate.found.effects)
     known_p = [confidence_set_p(step) for step in steps[: max(len(chosen), 1)]]
     picked = list(zip(steps, known_p, chosen, strict=False))
     taken = tuple(name for *_, name in picked)
@@ -128,7 +130,7 @@ def attribute(
     order = _strongest_first(search, current, chosen)
     return Attribution(
         base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps),
-        taken, float(strain_gain), known_p[0],
+        taken, strain_gain, strain_closes, known_p[0],
     )  # fmt: skip
 
 
@@ -222,15 +224,17 @@ def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
     return dataclasses.replace(again, gain=score.gain, per_group=score.per_group)
 
 
-def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, float]:
-    """The set with or without finite strain, whichever fits better, and the gain of having it."""
+def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, float, float]:
+    """The set with or without finite strain, whichever fits better, the gain of having it, and what it closes
+    of held-out squares, N^2: a law may be far likelier where noise is small, and still predict worse."""
     rest = [e for e in effects if e is not search.finite_strain]
     without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
     over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.noise.variance_inflation
     each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
     # the site that speaks loudest, for or against, may be one that slipped
     gain = (each.sum() - each.max() - each.min()) / over
-    return (deep if gain > -search.options.beyond_doubt else without), float(gain)
+    closes = float(without.plain.sum() - deep.plain.sum())
+    return (deep if gain > -search.options.beyond_doubt else without), float(gain), closes
 
 
 def _without_idle(

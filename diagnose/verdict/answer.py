@@ -125,14 +125,18 @@ def _finite_strain(findings: Findings, answer: Answer) -> None:
     size_n = finite_strain_size(findings.forward, found.base.found)
     if size_n <= findings.search.smallest_n:
         return
-    if found.finite_strain_gain > findings.search.options.beyond_doubt:
+    likelier = found.finite_strain_gain > findings.search.options.beyond_doubt
+    if likelier and found.finite_strain_closes > 0:
         sizes = {n: max(s[n].size_n for s in found.steps if n in s) for n in found.chosen}
         place = (i for i, n in enumerate(answer.names) if sizes.get(n, np.inf) < size_n)
         answer.names.insert(next(place, len(answer.names)), strain.name)
         answer.reasons.append(
             f"the presses are deep enough that small-strain elasticity is off by about {size_n:.3f} N"
         )
-    elif any(effect(n).hints.stands_for_strain for n in found.chosen):
+        return
+    if likelier:
+        answer.reasons.append("finite strain closes nothing at places that were not fitted: it is not named")
+    if any(effect(n).hints.stands_for_strain for n in found.chosen):
         # deep enough for it, and it fitted no worse than the linear law until another took its place
         if strain in (*found.final.found.effects, *found.base.found.effects):
             answer.candidates.append(strain.name)

@@ -85,10 +85,12 @@ def test_one_loud_site_does_not_decide_on_finite_strain(search, loud, named):
     def judged(effects):
         gram = np.zeros((24, 1, 1))
         gram[:, 0, 0] = 500.0 - (2 * quiet if effects else 0.0)
-        return SimpleNamespace(chi=1.0, found=SimpleNamespace(gram=gram, loss=gram.sum() / 2))
+        plain = np.full(24, 0.9 if effects else 1.0)
+        return SimpleNamespace(chi=1.0, plain=plain, found=SimpleNamespace(gram=gram, loss=gram.sum() / 2))
 
     search.judge = judged
     search.finite_strain = effect("finite_strain")
     search.forward = SimpleNamespace(touches=SimpleNamespace(noise=SimpleNamespace(variance_inflation=1.0)))
-    _, gain = _with_strain(search, [])
+    _, gain, closes = _with_strain(search, [])
+    assert closes == pytest.approx(2.4)
     assert (gain > AttributionOptions().beyond_doubt) == named

@@ -15,6 +15,7 @@ from diagnose.apply import corrected, improved
 from diagnose.forward.prediction import Forward
 from diagnose.options import DiagnoseOptions, NuisanceOptions
 from diagnose.pipeline import diagnose
+from diagnose.verdict.answer import answer_of
 from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.next_touch import next_touch
 from mechanics.model.files import read_model, write_model
@@ -244,6 +245,17 @@ def test_what_makes_the_held_out_gap_grow_is_a_candidate_and_never_named(bench, 
     assert result.effects == () and "time_delay" in result.candidates
     assert result.kind == "unknown" and result.gap_after_n == result.gap_before_n
     assert any("grows" in reason for reason in result.reasons)
+
+
+@pytest.mark.parametrize(("closes", "named"), [(1e-3, True), (-1e-3, False)])
+def test_finite_strain_is_named_only_where_it_predicts_better(nameless, monkeypatch, closes, named):
+    """However much likelier it makes presses that it was fitted to."""
+    monkeypatch.setattr("diagnose.verdict.answer.finite_strain_size", lambda *_: 0.1)
+    findings = nameless.findings
+    found = dataclasses.replace(findings.found, finite_strain_gain=30.0, finite_strain_closes=closes)
+    answer = answer_of(dataclasses.replace(findings, found=found), findings.search.whitener.counts())
+    assert ("finite_strain" in answer.names) == named
+    assert named != any("closes nothing" in reason for reason in answer.reasons)
 
 
 def test_the_page_says_what_to_do_and_its_view_switches_effects_on(
