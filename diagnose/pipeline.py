@@ -107,6 +107,9 @@ def diagnose(
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, lost))
     found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     clock.lap("effects")
+    for name in sorted(seen - set(found.chosen)):
+        refused = f"presses that were not fitted speak against that {name.replace('_', ' ')}"
+        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, refused))
 
     findings = Findings(
         forward, search, found, free, offsets, site_sd, frozenset(excluded),

@@ -240,14 +240,18 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, 
 def _without_idle(
     search: Search, chosen: list[str], current: Candidate, seen: frozenset[str]
 ) -> tuple[Candidate, list[str]]:
-    """Drop effects that later ones made idle."""
+    """Drop effects that later ones made idle, and what was seen elsewhere where it makes the held-out gap
+    larger: a reading may be wrong."""
     chosen = list(chosen)
     for name in list(chosen):
-        if len(chosen) < 2:
-            break
-        if name in seen:
+        if len(chosen) < 2 and name not in seen:
             continue
         without = search.judge([e for e in current.found.effects if e.name != name])
+        if name in seen:
+            if current.plain.sum() > without.plain.sum():
+                chosen.remove(name)
+                current = without
+            continue
         effect = next(e for e in current.found.effects if e.name == name)
         if effect.hints.slips and search.sideways_off(without):
             continue

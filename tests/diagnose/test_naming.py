@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnose.options import AttributionOptions
-from diagnose.search.attribution import _with_strain
+from diagnose.search.attribution import _with_strain, _without_idle
 from diagnose.search.evidence import Search
 from diagnose.search.gaps import lower_closure
 from diagnose.search.naming import Score
@@ -94,3 +94,15 @@ def test_one_loud_site_does_not_decide_on_finite_strain(search, loud, named):
     _, gain, closes = _with_strain(search, [])
     assert closes == pytest.approx(2.4)
     assert (gain > AttributionOptions().beyond_doubt) == named
+
+
+@pytest.mark.parametrize(("left", "stays"), [(0.9, True), (1.1, False)])
+def test_what_the_support_showed_stays_unless_presses_are_predicted_worse_with_it(search, left, stays):
+    gain = effect("force_gain")
+    plain, seen = (
+        SimpleNamespace(plain=np.full(24, value), found=SimpleNamespace(effects=effects))
+        for value, effects in ((1.0, ()), (left, (gain,)))
+    )
+    search.judge = lambda effects: seen if effects else plain
+    kept, chosen = _without_idle(search, [gain.name], seen, frozenset({gain.name}))
+    assert chosen == [gain.name] * stays and kept is (seen if stays else plain)
