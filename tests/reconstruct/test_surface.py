@@ -150,6 +150,9 @@ def test_uncertainty_is_small_at_touches_and_large_at_rims():
     wall = (np.abs(radius - 0.04) < 0.001) & (np.abs(local[:, 2] - 0.04) < 0.01)
     assert found.uncertainty_m[rim].mean() > 0.001
     assert found.uncertainty_m[wall].mean() < 0.0003
+    place, sd_m = found.least_known
+    height, across = back(place[None])[0, 2], np.linalg.norm(back(place[None])[0, :2])
+    assert sd_m > 0.001 and abs(height - 0.08) < 0.003 and abs(across - 0.04) < 0.003
 
 
 def test_uncertainty_covers_the_error_of_a_free_form():

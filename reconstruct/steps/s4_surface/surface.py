@@ -102,6 +102,17 @@ class Surface:
 
         return trimesh.Trimesh(self.vertices, self.triangles, process=False)
 
+    @property
+    def above_base(self) -> np.ndarray:
+        """(n,) bool, the vertices that do not lie on the support."""
+        return (self.vertices - self.support_point) @ self.support_normal > 1e-6
+
+    @property
+    def least_known(self) -> tuple[np.ndarray, float]:
+        """The vertex above the base whose place is least known, (3,) m, and its standard deviation, m."""
+        worst = int(np.argmax(np.where(self.above_base, self.uncertainty_m, 0.0)))
+        return self.vertices[worst], float(self.uncertainty_m[worst])
+
     @cached_property
     def frame(self) -> np.ndarray:
         """(3, 3), rows: unit vectors of a frame on the support, right-handed, the third along its normal."""
@@ -242,8 +253,7 @@ def shape_table(surface: Surface) -> dict[str, Any]:
     hull_volume_m3, tangent_volume_m3: bounds of a convex object. held_out_m: by shape tried. parameters: of
     the shape, in the support's frame.
     """
-    height = (surface.vertices - surface.support_point) @ surface.support_normal
-    deviation = surface.uncertainty_m[height > 1e-6]
+    deviation = surface.uncertainty_m[surface.above_base]
     low, high = surface.bracket_m3
     bounds = {"hull_volume_m3": low, "tangent_volume_m3": high}
     return {
