@@ -8,10 +8,9 @@ import numpy as np
 
 from palpate.show import model as made
 from palpate.show.reconstruction.exploration import force_over_time
-from palpate.show.reconstruction.page import lost, meaning, next_steps, report, tell, view
+from palpate.show.reconstruction.page import least_known, lost, meaning, next_steps, report, tell, view
 from reconstruct.methods import Solved
 from reconstruct.pipeline import Reconstruction
-from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.held_out import HeldOut
 
 if TYPE_CHECKING:
@@ -58,23 +57,13 @@ def lines(result: Reconstruction) -> list[str]:
     lines += [
         *exploration.dropped,
         f"surface: {surface.method}, {surface.volume_m3 * 1e6:.1f} cm³; {surface.reason}",
-        *([_least_known(surface)] if surface.shape is None else []),
+        *([f"  {least_known(surface)}"] if surface.shape is None else []),
         *(f"  {note}" for note in (result.placed.notes if result.placed else ())),
         f"mesh: {len(model.mesh.tetrahedra)} tetrahedra of {model.mesh_size_m * 1e3:g} mm "
         f"({len(model.mesh.points)} nodes), at most {1e3 * quality.surface_distance_m.max():.2f} mm off the "
         "surface",
     ]
     return lines
-
-
-def _least_known(surface: Surface) -> str:
-    """How well the shape is known, and where to press to know it better, in words."""
-    (x, y, z), sd_m = surface.least_known
-    usual_m = float(np.median(surface.uncertainty_m[surface.above_base]))
-    return (
-        f"  known within {1e3 * usual_m:.2g} mm (median), least at ({1e3 * x:.0f}, {1e3 * y:.0f}, "
-        f"{1e3 * z:.0f}) mm, within {1e3 * sd_m:.2g} mm: press there to know it better"
-    )
 
 
 def as_json(result: Reconstruction) -> dict[str, Any]:

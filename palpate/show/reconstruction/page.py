@@ -36,6 +36,7 @@ from palpate.show.reconstruction.tables import (
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
 from reconstruct.pipeline import Reconstruction
+from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s6_one_d.one_d import low_passed
 
 if TYPE_CHECKING:
@@ -233,11 +234,22 @@ def meaning(result: Reconstruction) -> str:
     return words
 
 
+def least_known(surface: Surface) -> str:
+    """How well a shape is known, and where to press to know it better, in words; standard deviations."""
+    (x, y, z), sd_m = surface.least_known
+    usual_m = float(np.median(surface.uncertainty_m[surface.above_base]))
+    return (
+        f"known within {1e3 * usual_m:.2g} mm (median), least at ({1e3 * x:.0f}, {1e3 * y:.0f}, "
+        f"{1e3 * z:.0f}) mm, within {1e3 * sd_m:.2g} mm: press there to know it better"
+    )
+
+
 def _how(page: Page, result: Reconstruction) -> None:
     surface = result.surface
+    known = f" It is {least_known(surface)}." if surface.shape is None else ""
     page.paragraph(
-        f"Shape: {surface.method}; {surface.reason}. Volume {surface.volume_m3 * 1e6:.1f} cm³. The sensor's "
-        f"noise is {result.exploration.noise_n * 1e3:.1f} mN an axis. "
+        f"Shape: {surface.method}; {surface.reason}.{known} Volume {surface.volume_m3 * 1e6:.1f} cm³. The "
+        f"sensor's noise is {result.exploration.noise_n * 1e3:.1f} mN an axis. "
         + (
             "The method is the paper's own."
             if paper_remade(result)
