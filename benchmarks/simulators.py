@@ -27,6 +27,7 @@ from benchmarks._known_shapes import SHAPES
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import meshed
 from benchmarks.timing import table
+from mechanics.errors import OptionError
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool
 from mechanics.progress import silent
@@ -241,10 +242,9 @@ class _Recorded:
         """The fields of a row."""
         from render.replay import replay_touches
 
-        presses, errors = self.presses, {}
-        force = replay_touches(
-            touched, self.recording, presses, self.chosen, failed=lambda p, error: errors.update({p: error})
-        )
+        presses = self.presses
+        errors: dict[int, OptionError] = {}
+        force = replay_touches(touched, self.recording, presses, self.chosen, failed=errors.__setitem__)
         chosen = [p for p in np.flatnonzero(self.chosen) if p not in errors]
         if not chosen:
             raise next(iter(errors.values()))

@@ -108,7 +108,7 @@ def diagnose(
     found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     clock.lap("effects")
     for name in sorted(seen - set(found.chosen)):
-        refused = f"presses that were not fitted speak against that {name.replace('_', ' ')}"
+        refused = f"{name.replace('_', ' ')}: the presses do not bear that out, so it is not named"
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, refused))
 
     findings = Findings(

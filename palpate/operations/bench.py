@@ -71,7 +71,7 @@ def _keep(path: str, asked: BenchOperands, figures: Any) -> None:
     print(f"kept: {kept}", file=sys.stderr)
 
 
-_PLACES = ("--evidence", "--json", "--work", "--data", "--python")
+_PLACES = ("--evidence", "--json", "--work", "--data", "--python", "--page")
 
 
 def _deciding(words: list[str]) -> list[str]:
