@@ -118,10 +118,16 @@ class Pointer:
         """The slider: how deep a press goes."""
         self.press_depth_m = float(np.clip(1e-3 * depth_mm, LEAST_PRESS_M, MOST_PRESS_M))
 
-    def place(self, duration_s: float) -> np.ndarray:
-        """(3,) m, where the hand means the tip's centre to be after another frame."""
+    def place(self, duration_s: float, felt: np.ndarray | None = None) -> np.ndarray:
+        """(3,) m, where the hand means the tip's centre to be after another frame.
+
+        felt: (3,) m, where the tip is. On its way over the object the hand waits for a tip that stays behind,
+        which would cut the corner, through the object.
+        """
         target = self.target
         if target is None:
+            return self._tip
+        if self._travelling and felt is not None and np.linalg.norm(felt - self._tip) > LEAP_M:
             return self._tip
         reach = MOST_SPEED_M_PER_S * duration_s
         away = float(np.linalg.norm(self._centre(target, self._depth) - self._tip))

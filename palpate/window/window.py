@@ -75,6 +75,7 @@ class TouchWindow:
         self.moved_by_mouse = channel is not None
         self._channel = channel
         self._last_s = time.perf_counter()
+        self._felt_at: np.ndarray | None = None
         self._end_s = float("inf")
         self._map = StiffnessMap(session.worker, session.servo.tip_radius_m)
         nodules = tuple(session.model.material.inclusions.values())
@@ -237,11 +238,12 @@ class TouchWindow:
         """One frame: pose out, state in, pictures moved. Returns what was drawn."""
         now = time.perf_counter()
         if self._channel is not None:
-            place = self.pointer.place(min(now - self._last_s, 0.1))
+            place = self.pointer.place(min(now - self._last_s, 0.1), self._felt_at)
             self._channel.write(now, tuple(place), int(self.pointer.pressing))
         self._last_s = now
         frame = self.session.frame()
         if frame is not None:
+            self._felt_at = frame.tip_m
             self._draw(frame)
         if now > self._end_s or not self.session.servo.alive:
             self.close()

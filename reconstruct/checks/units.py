@@ -161,6 +161,14 @@ def _finding(data: Samples, kind: str, name: str, odds: float, seen: dict[str, f
     )
 
 
+def _speed(moved: np.ndarray, passed: np.ndarray) -> float:
+    """m/s, at which a quarter of the way (k,) m in (k,) s is gone at most: however long the hand rests."""
+    speed = moved / passed
+    slow_first = np.argsort(speed)
+    gone = np.cumsum(moved[slow_first])
+    return float(speed[slow_first][np.searchsorted(gone, 0.25 * gone[-1])])
+
+
 def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:
     """The quantities of QUANTITIES that the recording has, in the units of `data`."""
     recording, radius = data.recording, data.tip_radius_m
@@ -176,7 +184,7 @@ def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:
         "ratio": extent / radius,
     }
     if len(moved) > 3:
-        found["speed"] = float(np.percentile(moved / passed, 80))
+        found["speed"] = _speed(moved, passed)
     if not of_touches:
         return _proper(found)
     found["noise"] = data.noise_n

@@ -12,6 +12,7 @@ from reconstruct.checks.finding import Finding, decades_of_tail
 from reconstruct.checks.outcome import Outcome, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened
 from reconstruct.checks.samples import Samples
+from reconstruct.checks.units import measured
 
 from ..support.faults import FAULTS
 from .exploration_of_cylinder import explore_cylinder
@@ -125,3 +126,24 @@ def test_an_outcome_that_is_none_is_an_error(modulus, interval, misfit, name):
 def test_the_probability_of_a_tail_is_the_binomial_one():
     assert decades_of_tail(3, 3, 0.01) == pytest.approx(6.0)
     assert decades_of_tail(0, 10, 0.5) == 0.0
+
+
+def test_a_hand_that_rests_most_of_the_time_moves_as_fast_as_it_moves(cylinder):
+    """Twenty seconds of thought after every second: the speed in the air is that of the second."""
+    recording, _ = cylinder
+    rate = round(recording.sample_rate_hz)
+    force = np.linalg.norm(recording.force_on_tool, axis=1)
+    repeats = np.ones(len(recording.t), dtype=int)
+    resting = [k for k in range(rate, len(force), rate) if force[k - 50 : k + 50].max() < 0.1]
+    repeats[resting] = 20 * rate
+    rows = np.repeat(np.arange(len(recording.t)), repeats)
+    rested = dataclasses.replace(
+        recording,
+        t=np.arange(len(rows)) / rate,
+        position=recording.position[rows],
+        force_on_tool=recording.force_on_tool[rows],
+        quaternion=None,
+    )
+    assert len(resting) > 3 and len(rows) > 5 * len(recording.t)
+    found = measured(Samples(rested))["speed"]
+    assert found == pytest.approx(measured(Samples(recording))["speed"], rel=0.5)

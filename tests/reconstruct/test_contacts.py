@@ -1,18 +1,20 @@
 """Palpations: all found, first touch to a fraction of a millimetre, what is no palpation named."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from mechanics.errors import ContactError, OptionError
+from mechanics.recording.recording import Recording
 from mechanics.recording.segments import Segment
 from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s1_filter.tool_weight import tool_weight
 from reconstruct.steps.s3_contacts import single_press
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 
-from .exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
+from .exploration_of_cylinder import HEIGHT, RADIUS, RATE, TILTED, TIP, explore_cylinder
 
 
 def distance_to_cylinder(points: np.ndarray) -> np.ndarray:
@@ -77,6 +79,41 @@ def test_what_the_low_pass_leaves_of_a_rendered_force_is_no_contact():
     near = np.convolve(touching[kept], np.ones(201), mode="same") > 0.5  # within 0.1 s of a touch
     left = np.linalg.norm(exploration.force, axis=1)[~near].max()
     assert 0 < left < exploration.threshold_n
+
+
+def by_a_mouse(presses: int) -> Recording:
+    """A rendered block of 80 x 80 x 40 mm under a mouse that moves at each frame of 16 ms: its foot is traced
+    with the tip leaning against it, its top pressed 4 mm deep, and else the hand rests."""
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * 0.045
+    around = np.concatenate([np.linspace(a, b, 3600) for a, b in pairwise(corners)])
+    above = np.array([0.0, 0.0, 0.04 + TIP])
+    ways = [np.tile(above + [0, 0, 0.008], (2000, 1)), np.insert(around, 2, TIP - 0.0003, axis=1)]
+    for k in range(presses):
+        lift = np.interp(np.arange(1700), [0, 600, 1100, 1700], [0.008, -0.004, -0.004, 0.008])
+        here = above + [0.01 * k, -0.008 * k, 0.0]
+        ways += [np.tile(here + [0, 0, 0.008], (3000, 1)), here + lift[:, None] * [0, 0, 1]]
+    way = np.concatenate([*ways, np.tile(ways[-1][-1], (2000, 1))])
+    ticks = np.arange(len(way))
+    way = way[ticks // 16 * 16]
+    beside = np.abs(way[:, :2]).max(axis=1) > 0.042
+    slides = beside & (way[:, 2] < TIP) & (ticks % 900 >= 60)
+    across = np.abs(way[:, :2]) >= np.abs(way[:, 1::-1])
+    force = np.zeros_like(way)
+    force[slides, :2] = 0.12 * (np.sign(way[:, :2]) * across)[slides]
+    force[slides, 2] = 0.464
+    depth = np.where(beside, 0.0, np.maximum(0.04 + TIP - way[:, 2], 0.0))
+    force[:, 2] += 0.61 * (depth / 0.004) ** 1.5
+    return Recording(ticks * 1e-3, way, force, RATE, TIP, boundary_phase=(1.9, 16.5))
+
+
+@pytest.mark.parametrize("presses", [1, 2, 4])
+def test_a_rendered_force_has_no_weight_and_is_touched_nowhere_else(presses):
+    """Of few presses after a long slide, the slide was taken for the tool's weight."""
+    recording = by_a_mouse(presses)
+    exploration = explore(recording, contact_options=ContactOptions(least_palpations=1))
+    assert len(exploration.presses) == presses
+    assert exploration.presses.depth_m == pytest.approx(np.full(presses, 0.004), abs=5e-5)
+    assert np.abs(exploration.presses.free_air).max() < 1e-12
 
 
 def test_bias_and_drift_of_the_sensor_are_followed():

@@ -29,6 +29,9 @@ _LOW = 0.7
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
+_STILL_S = 0.1
+"""A force without noise that is nothing for so long was rendered: it holds no weight and no drift, and what
+would be taken off it becomes a touch in the air."""
 _LOOSE = 0.5
 """Of the least contrast: what a touch stands above what free air may have done unseen. All of it costs true
 presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0102)."""
@@ -101,7 +104,8 @@ def filtered_of(
     position = low_pass_at(t, recording.position, rate, cutoff_hz)
     ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
     stated = 0.5 * (recording.force_noise_std_n or 0.0)
-    noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
+    read_noise = white_noise_std(recording.force_on_tool)
+    noise = max(read_noise, stated, ripple, 1e-6)
     white = noise * noise_gain(rate, cutoff_hz)
 
     def less(weight: ToolWeight | None, drift: np.ndarray, still: Callable[[np.ndarray], float]) -> Filtered:
@@ -115,8 +119,12 @@ def filtered_of(
         signals = Signals(recording, position, force, size, raw, noise)
         return Filtered(signals, free_air, spread, cutoff_hz, weight)
 
+    nothing = np.zeros_like(filtered)
     if tared:
-        return less(None, np.zeros_like(filtered), lambda size: white)
+        return less(None, nothing, lambda size: white)
+    untouched = (recording.force_on_tool == 0.0).all(axis=1)
+    if read_noise == 0.0 and any(b - a > _STILL_S * rate for a, b in runs(untouched)):
+        return less(None, nothing, lambda size: crowd_scale(size[untouched]))
     weight = tool_weight(recording, filtered, cutoff_hz, near=near)
     left = filtered - weight.force
     sliding = _sliding(recording, position)

@@ -110,6 +110,19 @@ class Driven:
         end = self.frame().time_s + seconds
         return self.until(lambda frame: frame.time_s > end)
 
+    def rests(self, seconds: float = RESTING_S) -> Frame:
+        """The frame in which hand and tip have stood still in one place for so long by the servo's clock."""
+        last: tuple[float, np.ndarray] = (np.inf, np.full(3, np.inf))
+
+        def still(frame: Frame) -> bool:
+            nonlocal last
+            meant = self.window.pointer.tip_m
+            if np.linalg.norm(meant - last[1]) > 1e-6 or np.linalg.norm(frame.tip_m - meant) > 1e-4:
+                last = frame.time_s, np.array(meant)
+            return frame.time_s > last[0] + seconds
+
+        return self.until(still)
+
     def pressed(self, depth_m: float) -> Frame:
         """The frame in which the tip rests as deep as this: the forces have come to rest as well."""
         last: tuple[float, np.ndarray] = (0.0, np.zeros(0))
@@ -181,8 +194,7 @@ def along_the_foot(driven: Driven, side: np.ndarray) -> None:
     right = np.array([-side[1], side[0], 0.0])
     reach = HALF + 0.008
     driven.mouse_at(HALF * side + 0.006 * side - reach * right)
-    driven.until(lambda f: bool(np.linalg.norm(f.tip_m - driven.window.pointer.tip_m) < 1e-4))
-    driven.wait(0.3)
+    driven.rests(0.3)
     driven.button(True)
     start, duration = driven.wait(0.6).time_s, 2 * reach / TRACING_M_PER_S
     share = 0.0
@@ -202,8 +214,8 @@ def as_the_ghost_says(driven: Driven, guide: Guide) -> None:
     driven.look_down(float(np.arcsin(np.clip(s.normal[2], np.sin(0.3), np.sin(1.2)))))
     driven.window.pointer.go_deep(1e3 * s.depth_m)
     driven.mouse_at(s.point)
-    driven.wait(1.5)
+    driven.rests(0.3)
     driven.button(True)
-    driven.wait(s.depth_m / 0.02 + 0.8)
+    driven.rests(0.5)
     driven.button(False)
     driven.until(lambda frame: guide.state.made > made and not driven.session.worker.busy)

@@ -23,11 +23,11 @@ from .small import SIZE
 
 def press(driven: Driven, place: np.ndarray) -> None:
     driven.mouse_at(place)
-    driven.wait(0.8)
+    driven.rests(0.3)
     driven.button(True)
-    driven.wait(0.9)
+    driven.rests(0.3)
     driven.button(False)
-    driven.wait(0.5)
+    driven.rests(0.3)
 
 
 @pytest.mark.slow

@@ -105,3 +105,16 @@ def test_travels_around_the_object_and_not_through_it(pointer: Pointer) -> None:
             )
             assert z >= R - BEAR_DOWN_M - 1e-9, "through the support"
         assert pointer.tip_m[0] == pytest.approx(0.07, abs=1e-6)
+
+
+def test_a_tip_that_stays_behind_is_waited_for_and_cuts_no_corner(pointer: Pointer) -> None:
+    """Frames take a tenth of a second, and the tip follows late, straight to where it was last told to be."""
+    down_at(pointer, -0.07, 0.005)
+    settle(pointer)
+    down_at(pointer, 0.07, 0.0)
+    felt = pointer.tip_m.copy()
+    for _ in range(200):
+        felt = felt + 0.2 * (pointer.place(0.1, felt) - felt)
+        outside = np.maximum(np.abs(felt[:2]) - 0.04, 0.0)
+        assert np.hypot(np.linalg.norm(outside), max(felt[2] - 0.04, 0.0)) >= R, "through the object"
+    assert felt[0] == pytest.approx(0.07, abs=1e-4)
