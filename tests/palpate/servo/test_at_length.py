@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 import pytest
 
 from ...support import effects_in_servo, soak
+from ..window.small import block_model
 
 pytestmark = pytest.mark.slow
 
@@ -17,11 +19,11 @@ def arguments(module, *words: str) -> argparse.Namespace:
     return parser.parse_args(words)
 
 
-def test_effects_are_felt_as_they_must_be():
+def test_effects_are_felt_as_they_must_be(tmp_path: Path):
     wanted = ["viscoelasticity", "mullins_softening", "friction_slip", "adhesion"]
-    found = effects_in_servo.run(arguments(effects_in_servo, "--effects", *wanted))
-    assert [row["effect"] for row in found["servo"]] == ["plain", *wanted]
-    assert all(row["right"] for row in found["servo"][1:])
+    rows = effects_in_servo.run_all(block_model(tmp_path), tmp_path, wanted)
+    assert [row["effect"] for row in rows] == ["plain", *wanted]
+    assert all(row["right"] for row in rows[1:])
 
 
 def test_models_are_swapped_while_touching_without_a_jump_or_a_leak():
