@@ -106,14 +106,17 @@ def by_a_mouse(presses: int) -> Recording:
     return Recording(ticks * 1e-3, way, force, RATE, TIP, boundary_phase=(1.9, 16.5))
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.01])
 @pytest.mark.parametrize("presses", [1, 2, 4])
-def test_a_rendered_force_has_no_weight_and_is_touched_nowhere_else(presses):
-    """Of few presses after a long slide, the slide was taken for the tool's weight."""
+def test_a_slide_is_not_taken_for_the_tools_weight(presses, noise):
+    """Of few presses after a long tracing; a force that was rendered has no weight at all."""
     recording = by_a_mouse(presses)
+    read = np.random.default_rng(presses).normal(0.0, noise, recording.force_on_tool.shape)
+    recording = dataclasses.replace(recording, force_on_tool=recording.force_on_tool + read)
     exploration = explore(recording, contact_options=ContactOptions(least_palpations=1))
     assert len(exploration.presses) == presses
-    assert exploration.presses.depth_m == pytest.approx(np.full(presses, 0.004), abs=5e-5)
-    assert np.abs(exploration.presses.free_air).max() < 1e-12
+    assert exploration.presses.depth_m == pytest.approx(np.full(presses, 0.004), abs=1e-4)
+    assert np.abs(exploration.presses.free_air).max() <= noise
 
 
 def test_bias_and_drift_of_the_sensor_are_followed():

@@ -125,9 +125,9 @@ def filtered_of(
     untouched = (recording.force_on_tool == 0.0).all(axis=1)
     if read_noise == 0.0 and any(b - a > _STILL_S * rate for a, b in runs(untouched)):
         return less(None, nothing, lambda size: crowd_scale(size[untouched]))
-    weight = tool_weight(recording, filtered, cutoff_hz, near=near)
-    left = filtered - weight.force
     sliding = _sliding(recording, position)
+    weight = tool_weight(recording, filtered, cutoff_hz, touched=sliding, near=near)
+    left = filtered - weight.force
     scale = max(white, crowd_scale(np.linalg.norm(left[~sliding], axis=1)))
     drift, _ = free_air_force(t, left, scale, touched=sliding)
     steady = less(weight, drift, lambda size: crowd_scale(size[~sliding]))
@@ -138,7 +138,7 @@ def filtered_of(
     if slow is None or interpolation_error(t, left, air) > crowd_median(steady.signals.magnitude[air]):
         return steady
     # mass and lateness were read from a force that turned
-    again = tool_weight(recording, filtered - slow, cutoff_hz)
+    again = tool_weight(recording, filtered - slow, cutoff_hz, touched=sliding)
     off = interpolation_error(t, filtered - again.force, air)
 
     def followed(drift: np.ndarray, loose: np.ndarray) -> Filtered:

@@ -47,13 +47,19 @@ class ToolWeight:
 
 
 def tool_weight(
-    recording: Recording, filtered: np.ndarray, cutoff_hz: float, *, near: ToolWeight | None = None
+    recording: Recording,
+    filtered: np.ndarray,
+    cutoff_hz: float,
+    *,
+    touched: np.ndarray | None = None,
+    near: ToolWeight | None = None,
 ) -> ToolWeight:
-    """What the tool makes in `filtered` force (n, 3) N. near: of a beginning of the recording: the search
-    starts there."""
+    """What the tool makes in `filtered` force (n, 3) N. touched: (n,) bool, where something is touched for
+    certain: no free motion is sought there. near: of a beginning of the recording: the search starts there.
+    """
     t = recording.t
     hand = low_pass_at(t, recording.position, recording.sample_rate_hz, cutoff_hz, derivative=2)
-    rows = _moving(hand, round(_LATE_S[-1] * recording.sample_rate_hz))
+    rows = _moving(hand, round(_LATE_S[-1] * recording.sample_rate_hz), touched)
     turned = np.zeros((len(t), 3, 0))
     if recording.quaternion is not None:
         turned = Rotation.from_quat(recording.quaternion[:, [1, 2, 3, 0]]).as_matrix()
@@ -85,10 +91,12 @@ def tool_weight(
     return ToolWeight(whole @ found, whole[:, :, mass] * found[mass], found, late_s)
 
 
-def _moving(hand: np.ndarray, aside: int) -> np.ndarray:
-    """Indices of samples with the greatest accelerations (n, 3) at most `aside` samples away."""
+def _moving(hand: np.ndarray, aside: int, touched: np.ndarray | None) -> np.ndarray:
+    """Indices of samples with the greatest accelerations (n, 3) at most `aside` samples away, but `touched`
+    ones."""
     most = maximum_filter1d(np.linalg.norm(hand, axis=1), 2 * aside + 1)
-    rows = np.flatnonzero(most >= np.quantile(most, 1 - _MOVING))
+    open_ = np.ones(len(most), dtype=bool) if touched is None else ~touched
+    rows = np.flatnonzero(open_ & (most >= np.quantile(most[open_], 1 - _MOVING)))
     return rows[np.linspace(0, len(rows) - 1, min(_SUBSAMPLE, len(rows))).astype(int)]
 
 
