@@ -162,7 +162,7 @@ def _finding(data: Samples, kind: str, name: str, odds: float, seen: dict[str, f
 
 
 def _speed(moved: np.ndarray, passed: np.ndarray) -> float:
-    """m/s, at which a quarter of the way (k,) m in (k,) s is gone at most: however long the hand rests."""
+    """m/s: a quarter of the way (k,) m in (k,) s is gone no faster; rests do not count."""
     speed = moved / passed
     slow_first = np.argsort(speed)
     gone = np.cumsum(moved[slow_first])

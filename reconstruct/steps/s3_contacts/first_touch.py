@@ -254,7 +254,7 @@ def _too_few(
         )
     return ContactError(
         f"{counts[0]} usable palpations among {counts[1]} contacts of phase II{why}; at least "
-        f"{request.least_presses} are needed: {hint}"
+        f"{request.least_presses} {'is' if request.least_presses == 1 else 'are'} needed: {hint}"
     )
 
 

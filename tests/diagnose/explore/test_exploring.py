@@ -87,6 +87,19 @@ def _rows(kind="press", n=400, late=0.0):
     return Segment(kind, t, np.zeros((n, 3)) + [0, 0, 0.05], np.zeros((n, 3)))
 
 
+def test_presses_that_missed_do_not_keep_the_next_one_at_the_same_place():
+    """Four presses of air and one of the object: how high it is is known, and its sides are asked for."""
+    recording, onsets = explore_cylinder(noise=0.01)
+    first, second = np.searchsorted(recording.t, onsets[:2] - 0.3)
+    explorer = Explorer(Instrument(recording.tip_radius_m))
+    air = slice(first - 400, first)
+    kinds = [("trace", slice(0, first)), *[("press", air)] * 4, ("press", slice(first, second))]
+    for kind, rows in kinds:
+        samples = recording.t[rows], recording.position[rows], recording.force_on_tool[rows]
+        explorer.add(Segment(kind, *samples))
+    assert explorer.suggest().why.endswith("where its sides and its top are")
+
+
 def test_segments_are_joined_end_to_end():
     made = join(Instrument(0.005), [_rows("trace", late=7.0), _rows(late=100.0)])
     assert len(made.t) == 800
