@@ -56,11 +56,16 @@ def draw(result: Explored, ax: Axes) -> None:
     ax.fill_between(made, low, high, color=MODULUS_COLOUR, alpha=0.18, lw=0, label="95 % sure")
     modulus = [s.state.modulus_pa / 1e3 for s in known]
     ax.plot(made, modulus, "o-", ms=4, color=MODULUS_COLOUR, label="estimate")
-    ax.set(xlabel="presses made", ylabel="Young's modulus [kPa]")
+    _over_presses(ax, "Young's modulus [kPa]")
     if known:
         last = modulus[-1]
         ax.set_ylim(max(0.0, 0.4 * last), 1.6 * last)
         ax.legend(frameon=False, loc="upper right")
+
+
+def _over_presses(ax: Axes, what: str) -> None:
+    ax.set(xlabel="presses made", ylabel=what)
+    ax.locator_params(axis="x", integer=True)
 
 
 def _draw_surface(result: Explored, ax: Axes) -> None:
@@ -71,7 +76,7 @@ def _draw_surface(result: Explored, ax: Axes) -> None:
     if result.goals.surface_within_m is not None:
         goal = 1e3 * result.goals.surface_within_m
         ax.axhline(goal, ls="--", lw=1, color=GOAL_COLOUR, label="goal")
-    ax.set(xlabel="presses made", ylabel="95 % of the surface within [mm]")
+    _over_presses(ax, "95 % of the surface within [mm]")
     ax.set_ylim(bottom=0)
     if known:
         ax.legend(frameon=False, loc="upper right")
