@@ -119,7 +119,7 @@ class Explorer:
     def bring_up_to_date(self) -> None:
         """Update the estimate with all segments, where they were put down without `add`."""
         try:
-            if self._base is None or self._estimate.surface is None:
+            if self._estimate.surface is None:
                 self._trace_only()
             if self._made >= LEAST_PRESSES:
                 before = self._estimate

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import norm
 
 from mechanics.recording.recording import Recording
+from mechanics.robust import weighted_quantile
 from reconstruct.checks.finding import SURE_ODDS, Finding, p_words, sure
 from reconstruct.checks.samples import Samples, Units
 
@@ -161,14 +162,6 @@ def _finding(data: Samples, kind: str, name: str, odds: float, seen: dict[str, f
     )
 
 
-def _speed(moved: np.ndarray, passed: np.ndarray) -> float:
-    """m/s: a quarter of the way (k,) m in (k,) s is gone no faster; rests do not count."""
-    speed = moved / passed
-    slow_first = np.argsort(speed)
-    gone = np.cumsum(moved[slow_first])
-    return float(speed[slow_first][np.searchsorted(gone, 0.25 * gone[-1])])
-
-
 def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:
     """The quantities of QUANTITIES that the recording has, in the units of `data`."""
     recording, radius = data.recording, data.tip_radius_m
@@ -184,7 +177,8 @@ def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:
         "ratio": extent / radius,
     }
     if len(moved) > 3:
-        found["speed"] = _speed(moved, passed)
+        # over the way, not over time: however long the hand rests
+        found["speed"] = weighted_quantile(moved / passed, moved, 0.25)
     if not of_touches:
         return _proper(found)
     found["noise"] = data.noise_n

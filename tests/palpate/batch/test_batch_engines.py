@@ -3,7 +3,6 @@ the scheduler restarted; and the same bits from the MODEL on, whoever does the w
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import shutil
@@ -21,8 +20,9 @@ import pytest
 from distributed import Client
 
 import palpate as pp
+from benchmarks._apply_replay import part_of
 from mechanics.recording.files import recording_files
-from mechanics.recording.recording import Recording, read_recording, write_recording
+from mechanics.recording.recording import read_recording, write_recording
 from palpate.child import module_environment
 from palpate.parallel.cluster import DaskExecutor
 from palpate.parallel.driver import run
@@ -36,6 +36,7 @@ from .test_batch_local import alive
 pytestmark = pytest.mark.slow
 
 DOZEN_S = 45.7
+"""Until here the recording holds its tracing and twelve presses."""
 
 
 class Cluster:
@@ -209,7 +210,9 @@ def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_mode
     """Of replay, compare and diagnose; beside a recording that is broken."""
     _, description = recording_files(embedded_recording("silicone-1-cylinder"))
     (tmp_path / "in").mkdir()
-    source = write_recording(tmp_path / "in" / "cylinder.csv.gz", _dozen_presses(description))
+    whole = read_recording(description)
+    dozen = part_of(whole, slice(0, int(np.searchsorted(whole.t, DOZEN_S))))
+    source = write_recording(tmp_path / "in" / "cylinder.csv.gz", dozen)
     (tmp_path / "in" / "broken.csv").write_text("t,x\n0,1\n")
     shutil.copy(description, tmp_path / "in" / "broken.toml")
     options = {
@@ -236,14 +239,6 @@ def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_mode
     assert answers["one"] == answers["two"] == answers["dask"]
     result.show(screenshot=tmp_path / "objects.png")
     assert "cylinder/thumbnail.png" in (tmp_path / "dask" / "index.html").read_text()
-
-
-def _dozen_presses(path: Path) -> Recording:
-    """Of the recording: its tracing and first twelve presses."""
-    whole = read_recording(path)
-    kept = whole.t < DOZEN_S
-    rows = {k: v[kept] for k, v in vars(whole).items() if isinstance(v, np.ndarray) and len(v) == len(kept)}
-    return dataclasses.replace(whole, **rows)
 
 
 def _executor(engine):
