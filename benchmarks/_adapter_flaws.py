@@ -23,18 +23,18 @@ from typing import Any
 import numpy as np
 
 from benchmarks._simulated_flaws import MODULUS_PA, NOISE_N, RADIUS_M, Block, Given, Layout
-from diagnose.other_simulator.stated import Stated
-from mechanics.disk.store import content_key
-from mechanics.disk.writing import atomic_file
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Tool
-from mechanics.progress import silent
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
-from render.options import BEST, RenderOptions
-from render.registry import create
-from render.replay import replay
-from render.simulators import base
+from palpate.diagnosis.other_simulator.stated import Stated
+from palpate.mechanics.disk.store import content_key
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Tool
+from palpate.mechanics.progress import silent
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.options import BEST, RenderOptions
+from palpate.render.registry import create
+from palpate.render.replay import replay
+from palpate.render.simulators import base
 
 POISSON = 0.40
 """Of the object: what every one of them can be given."""

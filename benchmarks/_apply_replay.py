@@ -13,19 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.apply import corrected, improved, with_effects, with_replayed_modulus
-from diagnose.options import DiagnoseOptions
-from diagnose.pipeline import diagnose
-from mechanics.disk.writing import atomic_file
-from mechanics.effects.registry import effect
-from mechanics.errors import RecordingError
-from mechanics.model.files import read_model, write_model
-from mechanics.model.model import Model
-from mechanics.recording.recording import Recording, read_recording
-from reconstruct.pipeline import ReconstructOptions, reconstruct
-from reconstruct.presses_on_model import presses_on
-from render.fem.renderer import FemRenderer
-from render.replay import replay_recording, rms_n
+from palpate.diagnosis.apply import corrected, improved, with_effects, with_replayed_modulus
+from palpate.diagnosis.options import DiagnoseOptions
+from palpate.diagnosis.pipeline import diagnose
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import Recording, read_recording
+from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct
+from palpate.reconstruction.presses_on_model import presses_on
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.replay import replay_recording, rms_n
 
 QUIET_S = 0.2
 QUIET_N = 0.05

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.search.attribution import Attribution
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.search.attribution import Attribution
 
 
 def best_by_bic(found: Attribution) -> str:

@@ -16,10 +16,17 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from devices.base import DeviceSpec
-from devices.impedance import HandImpedance, follow
-from devices.safety import WORDS, SafetyOptions, safety_parameters
-from mechanics.kernels import kept
+from palpate.devices.base import DeviceSpec
+from palpate.devices.impedance import HandImpedance, follow
+from palpate.devices.safety import WORDS, SafetyOptions, safety_parameters
+from palpate.mechanics.kernels import kept
+from palpate.render.coupling import (
+    series_compliance_m_per_n,
+    stable_stiffness_n_per_m,
+    stiffest_n_per_m,
+)
+from palpate.render.passivity import PassivityOptions, passivity_parameters
+from palpate.render.scene import in_the_air
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views
 from palpate.servo.loop import make_program, one_tick
 from palpate.servo.seqlock import write_block
@@ -42,13 +49,6 @@ from palpate.servo.tick import (
     TickParameters,
     tick_arrays,
 )
-from render.coupling import (
-    series_compliance_m_per_n,
-    stable_stiffness_n_per_m,
-    stiffest_n_per_m,
-)
-from render.passivity import PassivityOptions, passivity_parameters
-from render.scene import in_the_air
 
 SUBSTEPS = 20
 START_NS = 1_000_000_000

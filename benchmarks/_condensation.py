@@ -12,12 +12,12 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from mechanics.elastic import pardiso
-from mechanics.elastic.elasticity import stiffness
-from mechanics.elastic.solver import Solver, free_dofs
-from mechanics.errors import MeshError, OptionError
-from mechanics.progress import Progress, silent
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.elastic import pardiso
+from palpate.mechanics.elastic.elasticity import stiffness
+from palpate.mechanics.elastic.solver import Solver, free_dofs
+from palpate.mechanics.errors import MeshError, OptionError
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 _COLUMNS = 64  # right-hand sides solved at once
 _CONDENSED = 0.75  # share of the unknowns taken from the Schur complement, whose square is held twice;

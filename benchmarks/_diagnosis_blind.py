@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks._diagnosis_cases import FINITE, Case
-from mechanics.disk.writing import atomic_file
-from mechanics.errors import PalpateError
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.errors import PalpateError
 from palpate.parallel.graph import Task, finished
-from scenes.laboratory.specimen import VERSION
+from palpate.scenes.laboratory.specimen import VERSION
 
 _HERE = "benchmarks._diagnosis_blind"
 _MEMORY = {"solve": 600_000_000, "prepare": 700_000_000, "judge": 900_000_000}
@@ -82,8 +82,8 @@ def solve(number: int, finite: bool, work: str, laboratory: int) -> dict[str, An
     folder.
     """
     from benchmarks.varied.objects import specimen, thing
-    from scenes.laboratory.curves import Solving
-    from scenes.laboratory.paths import touch_forces
+    from palpate.scenes.laboratory.curves import Solving
+    from palpate.scenes.laboratory.paths import touch_forces
 
     it = thing(number)
     touches = [touch for place in it.places for touch in place]
@@ -101,9 +101,9 @@ def prepare(case: dict[str, Any], solve: bool, work: str, laboratory: int) -> di
 
     Raises NotSolved where touches would have to be solved and `solve` does not allow for it.
     """
-    from mechanics.model.files import write_model
-    from mechanics.recording.recording import read_recording
-    from reconstruct.pipeline import ReconstructOptions, reconstruct
+    from palpate.mechanics.model.files import write_model
+    from palpate.mechanics.recording.recording import read_recording
+    from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct
 
     this, at = _case(case), Path(work)
     for folder in ("truth", "models", "verdicts"):
@@ -136,8 +136,8 @@ def _failure(case: Case, work: Path) -> Path:
 def _explore(case: Case, work: Path, samples: Path, solve: bool) -> None:
     from benchmarks.varied.recorded import explored
     from benchmarks.varied.writing import write
-    from scenes.laboratory.curves import Solving
-    from scenes.laboratory.sealing import write_sealed
+    from palpate.scenes.laboratory.curves import Solving
+    from palpate.scenes.laboratory.sealing import write_sealed
 
     def refuse(label: str, share: float) -> None:
         if not solve:
@@ -164,11 +164,11 @@ def verdict_path(case: Case, work: Path) -> Path:
 def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[str, Any]:
     """Diagnose; the truth stays shut. Errors are a verdict too. The answer is written."""
     from benchmarks._baselines import best_by_bic, regressed_gap
-    from diagnose.options import DiagnoseOptions
-    from diagnose.pipeline import diagnose
-    from diagnose.verdict.corrections import factors
-    from mechanics.model.files import read_model
-    from mechanics.recording.recording import read_recording
+    from palpate.diagnosis.options import DiagnoseOptions
+    from palpate.diagnosis.pipeline import diagnose
+    from palpate.diagnosis.verdict.corrections import factors
+    from palpate.mechanics.model.files import read_model
+    from palpate.mechanics.recording.recording import read_recording
 
     this, at = _case(case), Path(work)
     answer: dict[str, Any]
@@ -211,7 +211,7 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
 
 def opened_case(case: Case, work: Path) -> dict[str, Any]:
     """The verdict with its truth, checked against the seal."""
-    from scenes.laboratory.sealing import opened
+    from palpate.scenes.laboratory.sealing import opened
 
     verdict = json.loads(verdict_path(case, work).read_text(encoding="utf-8"))
     truth = opened(work / f"{case.recording}.sealed", work / "truth" / f"{case.recording}.json")

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.varied.draws import Draw, draw
 from benchmarks.varied.shapes import FAMILIES
-from mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError
 
 INSTRUMENT = (
     "time_delay",

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from benchmarks._diagnosis_cases import ALIKE
 from benchmarks._diagnosis_where import Located, localisation, located
 from benchmarks.evidence import wilson
-from mechanics.effects.registry import effect, effects
+from palpate.mechanics.effects.registry import effect, effects
 
 FAMILIES = {"plasticity": ("mullins_softening",)}
 """What effects that the library has never had may be taken for, as declared; 'unknown' is right as well."""

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks._free_air import FreeAir
-from mechanics.kernels import step_kernel
-from mechanics.progress import Progress
-from render.base import State
+from palpate.mechanics.kernels import step_kernel
+from palpate.mechanics.progress import Progress
+from palpate.render.base import State
 
 
 class PlaneParameters(NamedTuple):

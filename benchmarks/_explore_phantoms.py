@@ -9,18 +9,18 @@ import numpy as np
 
 from benchmarks.varied.draws import draw
 from benchmarks.varied.objects import Thing, thing
-from diagnose.explore.causes import least_that_matters, projected
-from diagnose.explore.estimate import Estimate, updated
-from diagnose.explore.explorer import Suggestion
-from diagnose.explore.segments import join
-from diagnose.explore.weighing import Weighing, weigh
-from diagnose.search.detectable import SEEN
-from mechanics.errors import SceneError
+from palpate.diagnosis.explore.causes import least_that_matters, projected
+from palpate.diagnosis.explore.estimate import Estimate, updated
+from palpate.diagnosis.explore.explorer import Suggestion
+from palpate.diagnosis.explore.segments import join
+from palpate.diagnosis.explore.weighing import Weighing, weigh
+from palpate.diagnosis.search.detectable import SEEN
+from palpate.mechanics.errors import SceneError
 from palpate.robot.laboratory import LaboratoryRobot
-from scenes.laboratory.curves import ALONE
-from scenes.laboratory.presses import Touch
-from scenes.laboratory.session import SimulateOptions, Staging
-from scenes.laboratory.simulate import simulate
+from palpate.scenes.laboratory.curves import ALONE
+from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.session import SimulateOptions, Staging
+from palpate.scenes.laboratory.simulate import simulate
 
 OBJECTS = (0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 12, 13, 14, 17, 18)
 """Of the pool; a place of them is solved once and kept."""

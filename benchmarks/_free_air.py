@@ -6,8 +6,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from mechanics.kernels import step_kernel
-from render.base import State, new_state
+from palpate.mechanics.kernels import step_kernel
+from palpate.render.base import State, new_state
 
 
 class FreeAirParameters(NamedTuple):

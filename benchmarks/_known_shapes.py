@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.shape.nearest import sample
-from scenes.phantoms import phantom, rectangle, resampled
+from palpate.mechanics.shape.nearest import sample
+from palpate.scenes.phantoms import phantom, rectangle, resampled
 
 Distance = Callable[[np.ndarray], np.ndarray]
 CHORD_M = 1.8e-3

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from mechanics.errors import RecordingError
-from mechanics.recording.recording import Recording
-from scenes.laboratory.curves import PathJob, Solving, curves
-from scenes.laboratory.specimen import Specimen
-from scenes.phantoms import Phantom
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.recording.recording import Recording
+from palpate.scenes.laboratory.curves import PathJob, Solving, curves
+from palpate.scenes.laboratory.specimen import Specimen
+from palpate.scenes.phantoms import Phantom
 
 SHARES = np.array([0.0, 0.04, 0.1, 0.18, 0.28, 0.4, 0.52, 0.64, 0.76, 0.88, 0.97])
 """Depths that are compared, as shares of a press's greatest depth."""

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.optimize import least_squares, minimize_scalar
 from scipy.special import expit
 
-from mechanics.effects.power_law_relaxation import prony_terms
-from mechanics.effects.strain_stiffening import GREATEST, LEAST, hardening
-from mechanics.errors import RecordingError
-from reconstruct.machine_curves.compression import Compression
+from palpate.mechanics.effects.power_law_relaxation import prony_terms
+from palpate.mechanics.effects.strain_stiffening import GREATEST, LEAST, hardening
+from palpate.mechanics.errors import RecordingError
+from palpate.reconstruction.machine_curves.compression import Compression
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks._known_shapes import SHAPES, Distance, KnownShape
-from scenes.phantoms import circle, column, phantom, rectangle, resampled, stacked
+from palpate.scenes.phantoms import circle, column, phantom, rectangle, resampled, stacked
 
 KINDS = ("saddle", "concave", "thin", "near the base", "rim", "convex", "flat")
 """Of places; where several fit, thin, rim and near the base come before the curvature."""

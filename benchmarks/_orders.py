@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.explore.explorer import Order
+from palpate.diagnosis.explore.explorer import Order
 
 NEAR_M = 0.025
 """How far a person's next press usually is from the last."""

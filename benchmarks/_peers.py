@@ -15,14 +15,14 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from mechanics.elastic.solver import Solver
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
-from render.options import RenderOptions
-from render.simulators.mujoco import POISSON_LIMIT as FLEX_POISSON
-from render.simulators.mujoco import flex_xml
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.steps.s7_modulus.modulus_paper import nearest_nodes
+from palpate.render.options import RenderOptions
+from palpate.render.simulators.mujoco import POISSON_LIMIT as FLEX_POISSON
+from palpate.render.simulators.mujoco import flex_xml
 
 NEAR_M = 0.009
 """Around a place: where a tip may touch, for a solver that is told of nodes."""
@@ -67,7 +67,7 @@ class Palpate(Peer):
     name, made_for = "palpate", "one touched object, felt at 1 kHz by a rigid ball"
 
     def __init__(self, mesh: TetMesh, young_pa: float, poisson: float, radius_m: float) -> None:
-        import render
+        from palpate import render
 
         low = mesh.points[mesh.fixed].mean(axis=0)
         self.model = Model(
@@ -206,7 +206,7 @@ class Newton(Peer):
     name, made_for = "Newton", "many robots at once on a graphics card, some of what they hold soft"
 
     def __init__(self, mesh: TetMesh, young_pa: float, poisson: float, radius_m: float) -> None:
-        from render.simulators.newton import Newton as Adapter
+        from palpate.render.simulators.newton import Newton as Adapter
 
         low = mesh.points[mesh.fixed].mean(axis=0)
         support = Support(low, np.array([0.0, 0.0, 1.0]))

@@ -10,16 +10,16 @@ from scipy.spatial import cKDTree
 
 from benchmarks._known_shapes import KnownShape
 from benchmarks.felt_surface import NU, TIP_M, own_compliance_near, standing, straight_in
-from mechanics.disk.writing import atomic_file
-from mechanics.errors import PalpateError
-from mechanics.shape.tetmesh import TetMesh
-from render.fem.renderer import FemRenderer
-from render.force_error import place_numbers
-from render.options import RenderOptions
-from scenes.laboratory.mesh import laboratory_cache
-from scenes.laboratory.specimen import Fineness, Specimen, build
-from scenes.laboratory.surface import Surface
-from scenes.phantoms import Phantom
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.errors import PalpateError
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.force_error import place_numbers
+from palpate.render.options import RenderOptions
+from palpate.scenes.laboratory.mesh import laboratory_cache
+from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.phantoms import Phantom
 
 FINENESS = Fineness(2.0, 6.0, 0.5)
 """Of the laboratory's mesh."""

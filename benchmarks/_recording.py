@@ -8,8 +8,8 @@ from typing import Any
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.recording.recording import Recording, read_recording
-from scenes.embedded import embedded_recording
+from palpate.mechanics.recording.recording import Recording, read_recording
+from palpate.scenes.embedded import embedded_recording
 
 
 def add_recording(parser: argparse.ArgumentParser, repeats: int) -> None:

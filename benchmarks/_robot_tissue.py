@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from mechanics.recording.recording import Recording
-from scenes.laboratory.curves import Curve, PathJob, Solving, curves
-from scenes.laboratory.effects import Bench, effect
-from scenes.laboratory.specimen import Fineness, Specimen
-from scenes.laboratory.surface import Surface
-from scenes.phantoms import Phantom, column, rectangle, stacked
+from palpate.mechanics.recording.recording import Recording
+from palpate.scenes.laboratory.curves import Curve, PathJob, Solving, curves
+from palpate.scenes.laboratory.effects import Bench, effect
+from palpate.scenes.laboratory.specimen import Fineness, Specimen
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.phantoms import Phantom, column, rectangle, stacked
 
 CHEAP = Fineness(finest=3.0, reach=5.0, growth=1.2)
 """Half a second a place."""

@@ -11,13 +11,15 @@ from numba import njit, types
 
 from benchmarks._closed_loop import enabled_pose
 from benchmarks.compliance import block
-from devices.safety import SafetyOptions, safety_parameters
-from devices.virtual_hand import SPEC
-from mechanics.disk.scratch import cache_folder
-from mechanics.kernels import kept
-from mechanics.model.files import read_model, write_model
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
+from palpate.devices.safety import SafetyOptions, safety_parameters
+from palpate.devices.virtual_hand import SPEC
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.kernels import kept
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.render.passivity import PassivityOptions, passivity_parameters
+from palpate.render.scene import in_the_air
 from palpate.servo.clock import c_function, compiled_now_ns, compiled_sleep_until
 from palpate.servo.histogram import BINS, Histogram, count
 from palpate.servo.layout import (
@@ -42,8 +44,6 @@ from palpate.servo.tick import (
     account,
     tick_arrays,
 )
-from render.passivity import PassivityOptions, passivity_parameters
-from render.scene import in_the_air
 
 PERIOD_NS = 1_000_000
 LATE_NS = 200_000
@@ -143,8 +143,8 @@ class Measured(NamedTuple):
 
 def renderer_of(touchable: int) -> tuple[Any, np.ndarray]:
     """The FEM renderer of a block, its compliance kept in the cache folder; and the tool's path."""
-    import render
-    from render.options import RenderOptions
+    from palpate import render
+    from palpate.render.options import RenderOptions
 
     folder = cache_folder() / f"servo-benchmark-{touchable}"
     if not (folder / "model.toml").exists():

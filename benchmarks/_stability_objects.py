@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
-from devices.impedance import HandImpedance
-from devices.virtual_hand import SPEC
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
-from render.base import Renderer
-from render.fem.renderer import FemRenderer
-from render.options import RenderOptions
-from render.passivity import PassivityOptions
+from palpate.devices.impedance import HandImpedance
+from palpate.devices.virtual_hand import SPEC
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.base import Renderer
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
+from palpate.render.passivity import PassivityOptions
 
 SIZE_M = (0.06, 0.06, 0.03)
 DOME_RADIUS_M = 0.06

@@ -9,8 +9,8 @@ import numpy as np
 import pyvista
 from scipy.spatial import cKDTree
 
-from mechanics.shape.nearest import closest, sample
-from reconstruct.shapes.evidence import Evidence
+from palpate.mechanics.shape.nearest import closest, sample
+from palpate.reconstruction.shapes.evidence import Evidence
 
 TIP_RADIUS_M = 0.005
 
@@ -32,7 +32,7 @@ class Truth:
 
 def phantom_truth(name: str) -> Truth:
     """An embedded phantom."""
-    from scenes.phantoms import phantom
+    from palpate.scenes.phantoms import phantom
 
     found = phantom(name)
     return Truth(name, found.vertices, found.faces)
@@ -40,7 +40,7 @@ def phantom_truth(name: str) -> Truth:
 
 def _stack(name: str, outline: np.ndarray, levels: list[tuple[float, float]]) -> Truth:
     """Outline (n, 2) scaled and lifted by each (scale, z), fanned to the middle below and above."""
-    from reconstruct.shapes.shape import rings_to_mesh
+    from palpate.reconstruction.shapes.shape import rings_to_mesh
 
     rings = np.array([np.column_stack([s * outline, np.full(len(outline), z)]) for s, z in levels])
     return Truth(name, *rings_to_mesh(rings, np.array([0, 0, levels[-1][1]])))

@@ -11,16 +11,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechanics.compliance.patch import half_space_compliance
-from mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites, touch_solver
-from mechanics.contact.touch import forces_at
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.making import PathErrors, of_paths
-from mechanics.presses.table import Presses
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.steps.s7_modulus.modulus_field import FieldSites
+from palpate.mechanics.compliance.patch import half_space_compliance
+from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites, touch_solver
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.making import PathErrors, of_paths
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldSites
 
 NU, RATE_HZ, UP = 0.49, 200.0, np.array([0.0, 0.0, 1.0])
 FINE_M, COARSE_M = 0.0045, 0.010

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks._tissue import NU, tissue
-from mechanics.disk.toml_text import dump_toml
-from mechanics.recording.recording import Recording, description_table
+from palpate.mechanics.disk.toml_text import dump_toml
+from palpate.mechanics.recording.recording import Recording, description_table
 
 PLACES, ROWS = 110, 10
 CURVES, CURVE_ROWS, CURVE_TIP_M = 9, 5000, 1e-3

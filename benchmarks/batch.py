@@ -27,12 +27,11 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.errors import OptionError
-from mechanics.progress import Progress
-from mechanics.recording.files import recording_files
 from palpate.batching.plan import Choice
 from palpate.batching.run import Batch, batch
-from palpate.child import module_environment
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.progress import Progress
+from palpate.mechanics.recording.files import recording_files
 from palpate.output import progress_bar
 from palpate.parallel.driver import Status
 from palpate.parallel.driver import run as run_graph
@@ -95,7 +94,7 @@ def _kept(made: dict[str, Any]) -> list[Figure]:
 
 def copies(folder: Path, count: int) -> list[Path]:
     """The embedded recording so many times, each of other bytes."""
-    from scenes.embedded import embedded_recording
+    from palpate.scenes.embedded import embedded_recording
 
     samples, description = recording_files(embedded_recording())
     words = description.read_text(encoding="utf-8")
@@ -243,7 +242,6 @@ def dask_workers(count: int) -> Iterator[str]:
     processes = [
         subprocess.Popen(
             [sys.executable, "-m", "dask", *words, "--no-dashboard"],
-            env=module_environment(),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )

@@ -16,8 +16,8 @@ import numpy as np
 import palpate as pp
 from benchmarks.evidence import rates
 from benchmarks.timing import table
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import delayed
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import delayed
 
 TIP_M, RATE_HZ, NOISE_N = 0.004, 500.0, 0.005
 STIFF = "stiffness_n_per_m"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import gc
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -17,7 +18,7 @@ from typing import Any
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from palpate.child import module_command, module_environment
+from palpate.child import module_command
 
 AIM_S = 40.0
 
@@ -48,7 +49,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 def _measured(folder: str) -> dict[str, Any]:
     """What a process of its own says of its stages and kernels, with its compiled code in this folder."""
     command = module_command("benchmarks.compile")
-    environment = module_environment(NUMBA_CACHE_DIR=folder, OMP_NUM_THREADS="1")
+    environment = dict(os.environ, NUMBA_CACHE_DIR=folder, OMP_NUM_THREADS="1")
     done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
     answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return answer

@@ -18,11 +18,11 @@ import numpy as np
 from benchmarks._condensation import condense, inverse
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.elastic.pardiso import Pardiso, available
-from mechanics.elastic.solver import Solver
-from mechanics.errors import OptionError
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.elastic.pardiso import Pardiso, available
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.parallel.worker import high_water_bytes
 
 

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from benchmarks._recording import add_recording, recording_of, timed
-from reconstruct.steps.s3_contacts.contacts import explore
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
 PAPER_S = 10.0
 

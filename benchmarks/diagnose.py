@@ -25,7 +25,7 @@ from benchmarks._diagnosis_scores import summarise
 from benchmarks._diagnosis_tables import TARGETS, pictures, show
 from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
-from mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError
 from palpate.operations._to_argparse import finite
 from palpate.parallel.driver import Outcome
 from palpate.parallel.engine import run_with_bar

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.model.files import read_model
-from mechanics.model.model import Model
-from mechanics.recording.recording import Recording, read_recording
+from palpate.mechanics.model.files import read_model
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import Recording, read_recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,13 +57,13 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _model(recording: Recording, path: Path | None) -> Model:
-    from reconstruct.pipeline import ReconstructOptions, reconstruct
+    from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct
 
     return read_model(path) if path else reconstruct(recording, ReconstructOptions())
 
 
 def _support(recording: Recording, model: Model) -> dict[str, float]:
-    from diagnose.instrument.support_readings import rigid_of
+    from palpate.diagnosis.instrument.support_readings import rigid_of
 
     normal = model.support.normal
     found = rigid_of(recording, model.presses, normal)
@@ -87,16 +87,16 @@ def _support(recording: Recording, model: Model) -> dict[str, float]:
 
 def _limits(recording: Recording, model: Model) -> dict[str, float]:
     """{effect: N} of what the diagnosis searches for."""
-    from diagnose.forward.prediction import build_forward
-    from diagnose.forward.touches import touches_of
-    from diagnose.options import AttributionOptions, NuisanceOptions
-    from diagnose.search.detectable import detectable
-    from diagnose.search.evidence import Search
-    from diagnose.search.site_stiffness import site_stiffness_sd
-    from diagnose.search.starts import misfit_of
-    from mechanics.effects.base import Role
-    from mechanics.effects.registry import effects
-    from reconstruct.presses_on_model import presses_on
+    from palpate.diagnosis.forward.prediction import build_forward
+    from palpate.diagnosis.forward.touches import touches_of
+    from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+    from palpate.diagnosis.search.detectable import detectable
+    from palpate.diagnosis.search.evidence import Search
+    from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
+    from palpate.diagnosis.search.starts import misfit_of
+    from palpate.mechanics.effects.base import Role
+    from palpate.mechanics.effects.registry import effects
+    from palpate.reconstruction.presses_on_model import presses_on
 
     forward = build_forward(touches_of(presses_on(recording, model)), model)
     nuisance = NuisanceOptions()

@@ -21,10 +21,10 @@ import palpate as pp
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
-from diagnose.specimen.result import FLOORS, Material
-from mechanics.errors import RecordingError
-from reconstruct.machine_curves.uniaxial import CEILING
-from reconstruct.steps.s7_modulus.held_out import BETTER
+from palpate.diagnosis.specimen.result import FLOORS, Material
+from palpate.mechanics.errors import RecordingError
+from palpate.reconstruction.machine_curves.uniaxial import CEILING
+from palpate.reconstruction.steps.s7_modulus.held_out import BETTER
 
 BEEF_LAYER_M, BEEF_TIP_M = 0.0154, 0.005
 

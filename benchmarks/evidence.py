@@ -19,9 +19,9 @@ from typing import Any
 
 from scipy.stats import binomtest
 
-from mechanics.disk.reading import read_text
-from mechanics.disk.writing import JSON, atomic_file
-from mechanics.errors import FileError
+from palpate.mechanics.disk.reading import read_text
+from palpate.mechanics.disk.writing import JSON, atomic_file
+from palpate.mechanics.errors import FileError
 
 
 @dataclass(frozen=True)

@@ -23,16 +23,16 @@ from benchmarks._explore_phantoms import Sealed, robot_of, sealed, strengthened
 from benchmarks._orders import ORDERS
 from benchmarks.evidence import wilson
 from benchmarks.timing import table
-from diagnose.explore.causes import NONE
-from diagnose.explore.explorer import Explorer, State
-from diagnose.explore.goals import GoalOptions
-from mechanics.disk.scratch import cache_folder
-from mechanics.disk.store import content_key
-from mechanics.disk.writing import atomic_file
-from mechanics.errors import PalpateError
-from mechanics.shape.nearest import distance, sample
+from palpate.diagnosis.explore.causes import NONE
+from palpate.diagnosis.explore.explorer import Explorer, State
+from palpate.diagnosis.explore.goals import GoalOptions
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.disk.store import content_key
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.errors import PalpateError
+from palpate.mechanics.shape.nearest import distance, sample
 from palpate.output import progress_bar
-from scenes.laboratory.specimen import VERSION as LABORATORY
+from palpate.scenes.laboratory.specimen import VERSION as LABORATORY
 
 VERSION = 4
 """Of what an exploration does: raised when kept ones say nothing of the program any more."""

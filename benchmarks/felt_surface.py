@@ -18,21 +18,21 @@ from scipy.spatial import cKDTree
 from benchmarks._known_shapes import SHAPES, KnownShape
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.compliance.compression import own_blocks
-from mechanics.compliance.sites import patch_width, touch_solver
-from mechanics.compliance.surface_compliance import SurfaceCompliance
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.shape.flat_foot import Standing
-from mechanics.shape.nearest import sample
-from mechanics.shape.tetmesh import TetMesh, vertex_normals
-from mechanics.shape.true_shape import TrueShape
+from palpate.mechanics.compliance.compression import own_blocks
+from palpate.mechanics.compliance.sites import patch_width, touch_solver
+from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.shape.flat_foot import Standing
+from palpate.mechanics.shape.nearest import sample
+from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
+from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.output import progress_bar
-from reconstruct.shapes.coarse_drawing import decimated
-from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s5_mesh.meshing import MeshingOptions, fill
-from render.fem.renderer import FemRenderer
-from render.surface.contact_surface import contact_surface
+from palpate.reconstruction.shapes.coarse_drawing import decimated
+from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, fill
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.surface.contact_surface import contact_surface
 
 TIP_M, MODULUS_PA, NU = 0.005, 20e3, 0.49
 DEPTHS_M = (0.001, 0.003, 0.006)

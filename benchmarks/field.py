@@ -23,10 +23,10 @@ from scipy.interpolate import RBFInterpolator
 
 from benchmarks._tissue import Tissue, tissue
 from benchmarks.timing import table
-from diagnose.compare.comparison import CompareOptions, Comparison, compare_presses
-from diagnose.compare.models import HOMOGENEOUS, RIVALS, Prepared, as_touched, prepare
+from palpate.diagnosis.compare.comparison import CompareOptions, Comparison, compare_presses
+from palpate.diagnosis.compare.models import HOMOGENEOUS, RIVALS, Prepared, as_touched, prepare
 from palpate.output import progress_bar
-from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field, map_sd, with_field
+from palpate.reconstruction.steps.s7_modulus.modulus_field import asked_for, fit_field, map_sd, with_field
 
 PER_PLACE, TRUTH = "modulus-by-place", "truth"
 

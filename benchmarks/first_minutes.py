@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError
 from palpate.operations.bench import clone
 
 PARTS = ("install", "help", "demo", "touch", "nodule")

@@ -18,13 +18,13 @@ from benchmarks._surface_truth import phantom_truth
 from benchmarks.evidence import Figure
 from benchmarks.surface import deviation
 from benchmarks.timing import table
-from mechanics.errors import OptionError
-from mechanics.recording.recording import Recording, read_recording
-from reconstruct.pipeline import reconstruct_fully
-from reconstruct.steps.s4_surface.surface import SurfaceOptions, evidence_of, reconstruct_surface
-from render.fem.renderer import FemRenderer
-from render.options import RenderOptions
-from render.replay import replay_error, replay_recording
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.recording.recording import Recording, read_recording
+from palpate.reconstruction.pipeline import reconstruct_fully
+from palpate.reconstruction.steps.s4_surface.surface import SurfaceOptions, evidence_of, reconstruct_surface
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
+from palpate.render.replay import replay_error, replay_recording
 
 SAMPLES = {
     "silicone-1-cylinder": "cylinder",

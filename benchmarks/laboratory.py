@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks._laboratory_comparison import block_shape, by_depth, compare, cylinder_shape
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.recording.recording import read_recording
-from scenes.phantoms import phantom
+from palpate.mechanics.recording.recording import read_recording
+from palpate.scenes.phantoms import phantom
 
 KNOWN = {
     "silicone-1-cylinder": ("cylinder", cylinder_shape(40.0, 80.0)),

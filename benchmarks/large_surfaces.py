@@ -18,19 +18,19 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.compliance.patch import PatchSampler
-from mechanics.compliance.sites import LoadPatch, patch_loads, touch_sites
-from mechanics.compliance.stored_compliance import ComplianceOptions
-from mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
-from mechanics.contact.touch import TouchedPlaces, touch_forces
-from mechanics.elastic.solver import Solver
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.nearest import closest
-from mechanics.shape.refine import refined_near_surface
-from mechanics.shape.tetmesh import TetMesh
-from render.fem.renderer import FemRenderer
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.compliance.sites import LoadPatch, patch_loads, touch_sites
+from palpate.mechanics.compliance.stored_compliance import ComplianceOptions
+from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
+from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.nearest import closest
+from palpate.mechanics.shape.refine import refined_near_surface
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.fem.renderer import FemRenderer
 
 NU, MODULUS, RADIUS = 0.49, 20e3, 0.005
 

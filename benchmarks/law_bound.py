@@ -24,11 +24,11 @@ from benchmarks._pressed_places import in_laboratory, kept_force, rendered
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import TIP_M, meshed
 from benchmarks.timing import table
-from mechanics.disk.store import content_key
-from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.disk.store import content_key
+from palpate.mechanics.press_solver.press import PressOptions, PressSolver
+from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.output import progress_bar
-from render.force_error import law_share
+from palpate.render.force_error import law_share
 
 OF_THICKNESS, DEEPEST_M, LEAST_M, FIRST = 0.3, 2.5 * TIP_M, 2e-3, 0.12
 """Depths go to that share of what lies below, at most so deep, but always to LEAST_M; from that share on."""

@@ -20,12 +20,12 @@ from benchmarks._pressed_places import FINENESS, in_laboratory, kept_force, rend
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import NU, TIP_M, meshed
 from benchmarks.timing import table
-from mechanics.disk.store import content_key
-from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.disk.store import content_key
+from palpate.mechanics.press_solver.press import PressOptions, PressSolver
+from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.output import progress_bar
-from render.force_error import law_share
-from scenes.laboratory.specimen import Fineness
+from palpate.render.force_error import law_share
+from palpate.scenes.laboratory.specimen import Fineness
 
 DEPTHS_M = 1e-3 * np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
 BANDS_MM = ((1, 2), (2, 4), (4, 6), (6, 8))

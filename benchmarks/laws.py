@@ -24,9 +24,9 @@ from benchmarks.varied.draws import draw
 from benchmarks.varied.objects import thing
 from benchmarks.varied.recorded import explored
 from benchmarks.varied.writing import write
-from mechanics.errors import OptionError, PalpateError
-from scenes.laboratory.curves import Solving
-from scenes.laboratory.effects import REGISTRY
+from palpate.mechanics.errors import OptionError, PalpateError
+from palpate.scenes.laboratory.curves import Solving
+from palpate.scenes.laboratory.effects import REGISTRY
 
 LAWS = ("power_law_relaxation", "poroelasticity", "jkr_adhesion", "adhesion")
 OBJECTS, LEAST_PRESSES = 6, 18

@@ -27,16 +27,16 @@ from benchmarks.timing import table
 from benchmarks.varied.objects import Thing, thing
 from benchmarks.varied.recorded import explored, frame
 from benchmarks.varied.writing import write
-from diagnose.options import DiagnoseOptions
-from diagnose.pipeline import diagnose
-from diagnose.verdict.result import Diagnosis, NextTouch
-from mechanics.errors import PalpateError
-from mechanics.model.files import read_model
-from mechanics.recording.recording import read_recording
+from palpate.diagnosis.options import DiagnoseOptions
+from palpate.diagnosis.pipeline import diagnose
+from palpate.diagnosis.verdict.result import Diagnosis, NextTouch
+from palpate.mechanics.errors import PalpateError
+from palpate.mechanics.model.files import read_model
+from palpate.mechanics.recording.recording import read_recording
 from palpate.output import progress_bar
-from reconstruct.pipeline import reconstruct
-from scenes.laboratory.curves import Solving, workers_of_ours
-from scenes.laboratory.presses import Touch
+from palpate.reconstruction.pipeline import reconstruct
+from palpate.scenes.laboratory.curves import Solving, workers_of_ours
+from palpate.scenes.laboratory.presses import Touch
 
 WAYS = ("proposed", "by chance")
 

@@ -13,13 +13,13 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
-from mechanics.compliance.patch import PatchSampler
-from mechanics.compliance.sites import patch_width
-from mechanics.compliance.surface_compliance import patch_blocks
-from mechanics.elastic.inclusion import Region
-from mechanics.elastic.solver import Solver
-from mechanics.model.moduli import inclusion_ratio, mixed_ratio, share_inside
-from mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.compliance.sites import patch_width
+from palpate.mechanics.compliance.surface_compliance import patch_blocks
+from palpate.mechanics.elastic.inclusion import Region
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.model.moduli import inclusion_ratio, mixed_ratio, share_inside
+from palpate.mechanics.shape.box_mesh import box_mesh
 
 NU = 0.49
 

@@ -21,19 +21,19 @@ from typing import Any
 
 import numpy as np
 import psutil
+from tests.palpate.show.browser import Tab, a_tab, browser_found
 
 from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
-from mechanics.errors import OptionError
-from mechanics.frames import local_frames
 from palpate.exporting.page.document import page_of
 from palpate.exporting.page.tables import greatest_depth
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.frames import local_frames
 from palpate.operations.load import load
 from palpate.output import progress_bar
-from render.fem.renderer import FemRenderer
-from render.press import Stroke, press
-from render.scene import in_the_air
-from tests.palpate.show.browser import Tab, a_tab, browser_found
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.press import Stroke, press
+from palpate.render.scene import in_the_air
 
 OBJECTS = ("silicone-1", "silicone-2", "silicone-3", "bean", "nodule")
 SHARE, AT_LEAST_N = 0.02, 0.005

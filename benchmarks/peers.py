@@ -32,7 +32,7 @@ from benchmarks._peers import (
 from benchmarks.compliance import block
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.recording.recording import read_recording
+from palpate.mechanics.recording.recording import read_recording
 
 SHARES = np.array([0.25, 0.6, 1.0])
 """Of a press's greatest depth, for which a peer is asked; between them force over depth is straight in the
@@ -117,8 +117,8 @@ def _row(found: dict[str, Any]) -> list[Any]:
 
 def held_out(recording: Path, folder: Path | None, chosen: list[type[Peer]]) -> list[dict[str, Any]]:
     """Held-out rms error of each peer, N, over the contact samples of all presses."""
-    from diagnose.compare.comparison import CompareOptions, compare
-    from mechanics.model.files import read_model
+    from palpate.diagnosis.compare.comparison import CompareOptions, compare
+    from palpate.mechanics.model.files import read_model
 
     model = None if folder is None else read_model(folder)
     measured = read_recording(recording)

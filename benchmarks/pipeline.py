@@ -11,9 +11,9 @@ import numpy as np
 from benchmarks._recording import add_indentation, add_recording, recording_of
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from reconstruct.methods import METHODS
-from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
+from palpate.reconstruction.methods import METHODS
+from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
+from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperOptions
 
 PAPER_S = 45.0
 

@@ -18,20 +18,20 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.evidence import rates
 from benchmarks.timing import table
-from diagnose.forward.prediction import Forward, build_forward
-from diagnose.options import DiagnoseOptions
-from diagnose.pipeline import diagnose
-from mechanics.effects.backlash import EFFECT as PLAY
-from mechanics.effects.base import Scope
-from mechanics.effects.finite_strain import EFFECT as STRAIN
-from mechanics.effects.friction_slip import EFFECT as SLIP
-from mechanics.effects.registry import effect, effects
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.making import of_paths
-from mechanics.recording.recording import Recording
-from mechanics.recording.side_of_play import play
-from mechanics.shape.box_mesh import box_mesh
+from palpate.diagnosis.forward.prediction import Forward, build_forward
+from palpate.diagnosis.options import DiagnoseOptions
+from palpate.diagnosis.pipeline import diagnose
+from palpate.mechanics.effects.backlash import EFFECT as PLAY
+from palpate.mechanics.effects.base import Scope
+from palpate.mechanics.effects.finite_strain import EFFECT as STRAIN
+from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
+from palpate.mechanics.effects.registry import effect, effects
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.making import of_paths
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.side_of_play import play
+from palpate.mechanics.shape.box_mesh import box_mesh
 
 MODULUS_PA, NU, TIP_M, RATE_HZ = 20e3, 0.49, 0.005, 500.0
 NOISE_N, TREMOR_M, TREMOR_HZ, STEP_M = 0.01, 25e-6, 9.0, 3e-5

@@ -16,11 +16,11 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.contact.dent import dent_law
-from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
-from scenes.phantoms import PHANTOMS, Phantom
+from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.press_solver.press import PressOptions, PressSolver
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.scenes.phantoms import PHANTOMS, Phantom
 
 RADIUS_M, POISSON_RATIO = 5e-3, 0.49
 DEEPEST_MM = 8.0
@@ -103,7 +103,7 @@ class Place:
     """A place of a phantom, on its model's tetrahedra."""
 
     def __init__(self, name: str, near_mm: list[float] | None) -> None:
-        from mechanics.shape.nearest import closest
+        from palpate.mechanics.shape.nearest import closest
 
         self.phantom: Phantom = PHANTOMS[name]()
         self.name = name if near_mm is None else f"{name} near {' '.join(f'{c:g}' for c in near_mm)} mm"
@@ -123,7 +123,7 @@ class Place:
 
     def laboratory(self, depths: np.ndarray) -> tuple[np.ndarray, float]:
         """The same from the virtual laboratory, on fine elements."""
-        from scenes.laboratory.specimen import Fineness, Specimen, build
+        from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
 
         start = time.process_time()
         fine = Fineness(1.5, 4.0, 0.35)

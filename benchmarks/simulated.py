@@ -35,18 +35,18 @@ from benchmarks._adapter_flaws import ALIKE, CONTROLS, LAYOUT, AdapterFlaw, Para
 from benchmarks._simulated_flaws import FLAWS, Block, Flaw, Given, simulated
 from benchmarks._simulated_scores import figures_of, print_cases
 from benchmarks.timing import table
-from diagnose.options import AttributionOptions, DiagnoseOptions
-from diagnose.other_simulator.forces import Forces, ForcesOptions
-from diagnose.other_simulator.pipeline import Asked, diagnose_simulated
-from diagnose.other_simulator.result import SimulatedGap
-from diagnose.other_simulator.stated import KEYS, Stated
-from diagnose.pipeline import diagnose
-from diagnose.verdict.result import Diagnosis
-from mechanics.errors import OptionError
-from mechanics.model.model import Model
-from mechanics.recording.recording import Recording
+from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions
+from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions
+from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
+from palpate.diagnosis.other_simulator.result import SimulatedGap
+from palpate.diagnosis.other_simulator.stated import KEYS, Stated
+from palpate.diagnosis.pipeline import diagnose
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import Recording
 from palpate.output import progress_bar
-from scenes.laboratory.sealing import digest
+from palpate.scenes.laboratory.sealing import digest
 
 LATE_S = 0.03
 

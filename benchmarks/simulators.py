@@ -27,15 +27,15 @@ from benchmarks._known_shapes import SHAPES
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import meshed
 from benchmarks.timing import table
-from mechanics.errors import OptionError
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.progress import silent
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
-from render.options import DOCUMENTED, SETTINGS, RenderOptions
-from render.registry import create, simulator_names
-from render.replay import replay
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.progress import silent
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.options import DOCUMENTED, SETTINGS, RenderOptions
+from palpate.render.registry import create, simulator_names
+from palpate.render.replay import replay
 
 YOUNG_PA, POISSON, RATE_HZ, SPEED_M_PER_S = 20e3, 0.45, 250.0, 0.02
 HOLD_S = 0.1
@@ -226,12 +226,12 @@ class _Recorded:
     @classmethod
     def of(cls, path: Path | None, folder: Path | None, most: int) -> _Recorded:
         """The embedded recording where there is no path; reconstructed where there is no model."""
-        from diagnose.other_simulator.presses_to_run import spread_out
-        from mechanics.model.files import read_model
-        from mechanics.recording.recording import read_recording
+        from palpate.diagnosis.other_simulator.presses_to_run import spread_out
+        from palpate.mechanics.model.files import read_model
+        from palpate.mechanics.recording.recording import read_recording
         from palpate.operations.reconstruct import reconstruct
-        from reconstruct.presses_on_model import presses_on
-        from scenes.embedded import embedded_recording
+        from palpate.reconstruction.presses_on_model import presses_on
+        from palpate.scenes.embedded import embedded_recording
 
         recording = read_recording(path or embedded_recording())
         model = read_model(folder) if folder else reconstruct(recording, progress=False).model
@@ -240,7 +240,7 @@ class _Recorded:
 
     def pressed(self, touched: Any, own: list[float] | None) -> dict[str, Any]:
         """The fields of a row."""
-        from render.replay import replay_touches
+        from palpate.render.replay import replay_touches
 
         presses = self.presses
         errors: dict[int, OptionError] = {}

@@ -21,9 +21,9 @@ from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
 from benchmarks._elastic_plane import ElasticPlane
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from devices.impedance import HandImpedance
-from devices.virtual_hand import SPEC
-from render.passivity import PassivityOptions
+from palpate.devices.impedance import HandImpedance
+from palpate.devices.virtual_hand import SPEC
+from palpate.render.passivity import PassivityOptions
 
 AIM_J = 1e-3
 TIP_RADIUS_M, TYPICAL_DEPTH_M = 0.005, 0.003

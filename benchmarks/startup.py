@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from palpate.child import module_command, module_environment
+from palpate.child import module_command
 
 HELP_S, OVER_NUMPY_S = 0.15, 0.3
 
@@ -55,5 +55,5 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _user_s(command: list[str]) -> float:
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    subprocess.run(command, env=module_environment(), stdout=subprocess.DEVNULL, check=True)
+    subprocess.run(command, stdout=subprocess.DEVNULL, check=True)
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before

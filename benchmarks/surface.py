@@ -17,9 +17,9 @@ import numpy as np
 from benchmarks._surface_truth import OWN, Truth, phantom_truth, touch
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from mechanics.shape.nearest import distance, sample
+from palpate.mechanics.shape.nearest import distance, sample
 from palpate.output import progress_bar
-from reconstruct.steps.s4_surface.surface import SURFACES, SurfaceOptions, reconstruct_surface
+from palpate.reconstruction.steps.s4_surface.surface import SURFACES, SurfaceOptions, reconstruct_surface
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def truths() -> dict[str, Any]:
     """Makers of every known shape by name: the phantoms' and a few of which no phantom exists."""
-    from scenes.phantoms import PHANTOMS
+    from palpate.scenes.phantoms import PHANTOMS
 
     return {**{name: (lambda name=name: phantom_truth(name)) for name in PHANTOMS}, **OWN}
 

@@ -20,13 +20,13 @@ import numpy as np
 from benchmarks._robot_tissue import RobotTissue, robot_tissue
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS, predicted, prepare, rms
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
+from palpate.diagnosis.compare.models import HOMOGENEOUS, MODELS, RIVALS, predicted, prepare, rms
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.output import progress_bar
-from reconstruct.presses_on_model import presses_on
+from palpate.reconstruction.presses_on_model import presses_on
 
 _EDGE_M, _MARGIN_M = 0.011, 0.030
 BETTER, ALIKE = 0.9, 1.05

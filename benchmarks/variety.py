@@ -30,14 +30,14 @@ from benchmarks.timing import table
 from benchmarks.varied.draws import Draw, draw
 from benchmarks.varied.objects import solved, thing
 from benchmarks.varied.recorded import Varied, record
-from diagnose.pipeline import diagnose
-from mechanics.disk.scratch import cache_folder
-from mechanics.disk.writing import atomic_file
-from mechanics.errors import PalpateError
-from mechanics.model.model import Model
+from palpate.diagnosis.pipeline import diagnose
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.errors import PalpateError
+from palpate.mechanics.model.model import Model
 from palpate.output import progress_bar
-from reconstruct.pipeline import reconstruct_fully
-from scenes.laboratory.curves import workers_of_ours
+from palpate.reconstruction.pipeline import reconstruct_fully
+from palpate.scenes.laboratory.curves import workers_of_ours
 
 ROOMS = ("mechanics", "reconstruct")
 _WITHIN_S = 0.15

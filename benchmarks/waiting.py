@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import shutil
 import subprocess
@@ -23,8 +24,8 @@ import numpy as np
 from benchmarks._waiting_cases import CURVE_ROWS, CURVE_TIP_M, CURVES, PLACES, machine_curves, robot_probing
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from diagnose.compare.models import RIVALS
-from palpate.child import module_command, module_environment
+from palpate.child import module_command
+from palpate.diagnosis.compare.models import RIVALS
 from palpate.output import progress_bar
 
 LIMITS_S = {"compare": 60.0, "diagnose": 120.0, "material": 20.0}
@@ -104,7 +105,7 @@ def _spent(*words: Any) -> float:
         return usage.ru_utime + usage.ru_stime
 
     before = used()
-    environment = module_environment(**ONE_THREAD)
+    environment = dict(os.environ, **ONE_THREAD)
     command = module_command("palpate", *map(str, words))
     subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=True)
     return used() - before

@@ -33,12 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Print the table; returns its figures, s."""
-    from devices.channel import PoseChannel
-    from devices.registry import DeviceChoice, options_of
+    from palpate.devices.channel import PoseChannel
+    from palpate.devices.registry import DeviceChoice, options_of
+    from palpate.scenes.build import model_of
+    from palpate.scenes.scene import load_scene
     from palpate.window.session import SessionOptions, TouchSession
     from palpate.window.window import TouchWindow
-    from scenes.build import model_of
-    from scenes.scene import load_scene
 
     scene = load_scene(arguments.scene)
     model = model_of(scene)

@@ -15,8 +15,8 @@ from typing import Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from mechanics.errors import DeviceError
-from mechanics.tip_state import TipState
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.tip_state import TipState
 
 Clock = Callable[[], float]
 """Seconds, monotonic; `host_clock` for real devices, a fake one in tests and headless runs."""

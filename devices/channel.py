@@ -15,7 +15,7 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from mechanics.disk.scratch import memory_folder, temporary_prefix
+from palpate.mechanics.disk.scratch import memory_folder, temporary_prefix
 
 _RECORD = struct.Struct("<Qd3dI")
 _CHECK = struct.Struct("<I")

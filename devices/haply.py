@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, host_clock
-from devices.codecs import haply as codec
-from devices.io_thread import ForcefulDevice, Reading, found
-from mechanics.errors import DeviceError
-from mechanics.options import check_ranges, option
+from palpate.devices.base import Availability, Clock, DeviceSpec, host_clock
+from palpate.devices.codecs import haply as codec
+from palpate.devices.io_thread import ForcefulDevice, Reading, found
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.options import check_ranges, option
 
 SPEC = DeviceSpec(
     name="haply",

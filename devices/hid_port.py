@@ -15,8 +15,8 @@ from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
-from devices.base import Availability, DeviceSpec
-from mechanics.errors import DeviceError
+from palpate.devices.base import Availability, DeviceSpec
+from palpate.mechanics.errors import DeviceError
 
 DRAIN_LIMIT = 256
 """More than the kernel queues (about 63): one drain ends even when a device floods."""

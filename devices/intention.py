@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mechanics.errors import DeviceError
+from palpate.mechanics.errors import DeviceError
 
 
 class Intention(Protocol):

@@ -22,7 +22,7 @@ from typing import Protocol
 
 import numpy as np
 
-from devices.base import (
+from palpate.devices.base import (
     LONGEST_HOLD_S,
     Availability,
     Clock,
@@ -31,8 +31,8 @@ from devices.base import (
     finite_vector,
     host_clock,
 )
-from mechanics.errors import DeviceError
-from mechanics.tip_state import IDENTITY_QUATERNION, TipState
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.tip_state import IDENTITY_QUATERNION, TipState
 
 POLL_S = 0.001
 FIRST_RETRY_S = 0.1

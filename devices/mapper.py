@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from mechanics.bounds import FARTHEST_M, FASTEST_M_PER_S
-from mechanics.errors import OptionError
-from mechanics.options import check_ranges, option
-from mechanics.tip_state import TipState
+from palpate.mechanics.bounds import FARTHEST_M, FASTEST_M_PER_S
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.tip_state import TipState
 
 LONGEST_RATE_STEP_S = 0.05
 _AXES = {"x": 0, "y": 1, "z": 2}

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, OpenInWith, host_clock
-from devices.channel import PoseChannel
-from devices.impedance import HandImpedance
-from mechanics.errors import DeviceError
-from mechanics.options import option
-from mechanics.tip_state import TipState
+from palpate.devices.base import Availability, Clock, DeviceSpec, OpenInWith, host_clock
+from palpate.devices.channel import PoseChannel
+from palpate.devices.impedance import HandImpedance
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.options import option
+from palpate.mechanics.tip_state import TipState
 
 SPEC = DeviceSpec(
     name="mouse",

@@ -29,11 +29,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from devices.base import LONGEST_HOLD_S, Availability, Clock, DeviceSpec, host_clock
-from devices.io_thread import ZERO, ForcefulDevice, Reading, found
-from devices.vendor_library import load, need, offered
-from mechanics.errors import DeviceError
-from mechanics.options import option
+from palpate.devices.base import LONGEST_HOLD_S, Availability, Clock, DeviceSpec, host_clock
+from palpate.devices.io_thread import ZERO, ForcefulDevice, Reading, found
+from palpate.devices.vendor_library import load, need, offered
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.options import option
 
 SPEC = DeviceSpec(
     name="openhaptics",

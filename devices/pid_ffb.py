@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, host_clock
-from devices.codecs import pid
-from devices.codecs.pid import PidLayout
-from devices.hid_port import HidPort, enumerate_devices, load, opened, permitted
-from devices.io_thread import ForcefulDevice, Reading
-from mechanics.errors import DeviceError
-from mechanics.options import check_ranges, option
+from palpate.devices.base import Availability, Clock, DeviceSpec, host_clock
+from palpate.devices.codecs import pid
+from palpate.devices.codecs.pid import PidLayout
+from palpate.devices.hid_port import HidPort, enumerate_devices, load, opened, permitted
+from palpate.devices.io_thread import ForcefulDevice, Reading
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.options import check_ranges, option
 
 SPEC = DeviceSpec(
     name="pid-ffb",

@@ -7,19 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from devices.base import Availability, Clock, DeviceSpec, PositionSource, host_clock
-from mechanics.errors import DeviceError
-from mechanics.names import unknown
+from palpate.devices.base import Availability, Clock, DeviceSpec, PositionSource, host_clock
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.names import unknown
 
 DEVICES: dict[str, tuple[str, str, str]] = {
-    "mouse": ("devices.mouse", "MouseDevice", "MouseOptions"),
-    "spacemouse": ("devices.spacemouse", "make", "SpacemouseOptions"),
-    "pid-ffb": ("devices.pid_ffb", "make", "PidOptions"),
-    "haply": ("devices.haply", "make", "HaplyOptions"),
-    "forcedimension": ("devices.forcedimension", "make", "ForceDimensionOptions"),
-    "openhaptics": ("devices.openhaptics", "make", "OpenHapticsOptions"),
-    "simulated": ("devices.virtual_hand", "SimulatedHand", "SimulatedOptions"),
-    "replay": ("devices.replay", "ReplayDevice", "ReplayOptions"),
+    "mouse": ("palpate.devices.mouse", "MouseDevice", "MouseOptions"),
+    "spacemouse": ("palpate.devices.spacemouse", "make", "SpacemouseOptions"),
+    "pid-ffb": ("palpate.devices.pid_ffb", "make", "PidOptions"),
+    "haply": ("palpate.devices.haply", "make", "HaplyOptions"),
+    "forcedimension": ("palpate.devices.forcedimension", "make", "ForceDimensionOptions"),
+    "openhaptics": ("palpate.devices.openhaptics", "make", "OpenHapticsOptions"),
+    "simulated": ("palpate.devices.virtual_hand", "SimulatedHand", "SimulatedOptions"),
+    "replay": ("palpate.devices.replay", "ReplayDevice", "ReplayOptions"),
 }
 """name: (module, what makes one there, its options). A module also has `find(options=None)`."""
 

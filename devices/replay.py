@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, OpenInWith, host_clock
-from mechanics.errors import DeviceError
-from mechanics.options import option
-from mechanics.recording.recording import Recording, read_recording
-from mechanics.tip_state import IDENTITY_QUATERNION, TipState
+from palpate.devices.base import Availability, Clock, DeviceSpec, OpenInWith, host_clock
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.options import option
+from palpate.mechanics.recording.recording import Recording, read_recording
+from palpate.mechanics.tip_state import IDENTITY_QUATERNION, TipState
 
 SPEC = DeviceSpec(
     name="replay", title="a recording, played back", workspace_radius_m=1.0, max_speed_m_per_s=2.0

@@ -19,11 +19,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from devices.base import DeviceSpec
-from mechanics.bounds import FARTHEST_M, LARGEST_N, within
-from mechanics.errors import OptionError
-from mechanics.kernels import inner, kernel
-from mechanics.options import check_ranges, option
+from palpate.devices.base import DeviceSpec
+from palpate.mechanics.bounds import FARTHEST_M, LARGEST_N, within
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.kernels import inner, kernel
+from palpate.mechanics.options import check_ranges, option
 
 OFF, NOT_FINITE, STALE, OUTSIDE, DISCONNECTED, UNCALIBRATED, FAULT, OVER_SPEED, JUMP, CLOCK = (
     1 << k for k in range(10)

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, host_clock
-from devices.codecs import spacemouse as codec
-from devices.hid_port import HidPort, enumerate_devices, load, opened, permitted
-from devices.io_thread import Reading, ThreadedDevice
-from mechanics.errors import DeviceError
-from mechanics.options import option
+from palpate.devices.base import Availability, Clock, DeviceSpec, host_clock
+from palpate.devices.codecs import spacemouse as codec
+from palpate.devices.hid_port import HidPort, enumerate_devices, load, opened, permitted
+from palpate.devices.io_thread import Reading, ThreadedDevice
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.options import option
 
 SPEC = DeviceSpec(
     name="spacemouse",

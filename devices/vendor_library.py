@@ -8,7 +8,7 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from mechanics.errors import DeviceError
+from palpate.mechanics.errors import DeviceError
 
 
 def candidates(stems: Sequence[str], folders: Sequence[str]) -> list[Path]:

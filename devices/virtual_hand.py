@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from devices.base import (
+from palpate.devices.base import (
     LONGEST_HOLD_S,
     Availability,
     Clock,
@@ -21,11 +21,11 @@ from devices.base import (
     finite_vector,
     host_clock,
 )
-from devices.impedance import HandImpedance, follow
-from devices.intention import FreeExploration, Intention
-from mechanics.errors import DeviceError
-from mechanics.options import check_ranges, option
-from mechanics.tip_state import TipState
+from palpate.devices.impedance import HandImpedance, follow
+from palpate.devices.intention import FreeExploration, Intention
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.tip_state import TipState
 
 SPEC = DeviceSpec(
     name="simulated",

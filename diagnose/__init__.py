@@ -5,4 +5,6 @@ tool's, `search` fits effects and weighs them, `verdict` says what is named and 
 `calibrate`, `compare`, `explore` and `specimen` use these.
 """
 
-import mechanics as mechanics  # it says where compiled kernels are kept, before the first is decorated
+from palpate import (
+    mechanics as mechanics,  # it says where compiled kernels are kept, before the first is decorated
+)

@@ -10,11 +10,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from diagnose.search.attribution import Attribution
-from mechanics.effects.base import Role
-from mechanics.effects.registry import effect, effects
-from mechanics.model.model import Model
-from mechanics.recording.recording import Recording
+from palpate.diagnosis.search.attribution import Attribution
+from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.registry import effect, effects
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import Recording
 
 WORSE = 0.02
 """Share of the given model's gap: replays that differ by less are alike."""
@@ -69,8 +69,8 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
     leave to the modulus is made good here, by the median over presses: one drag that the model misses must
     not decide. recording: read right (`corrected`). Where the replay gives no force the model stays.
     """
-    from render.fem.renderer import FemRenderer
-    from render.replay import replay_recording
+    from palpate.render.fem.renderer import FemRenderer
+    from palpate.render.replay import replay_recording
 
     counted = model.presses.touching(recording.t)
     begins = np.flatnonzero(np.diff(np.concatenate([[False], counted])) & counted)
@@ -126,8 +126,8 @@ def improvement(model: Model, diagnosis: Verdict, recording: Recording) -> Impro
 
 def replayed_gap_n(model: Model, recording: Recording) -> float:
     """N rms of measured less rendered force while pressing; nan where the recording has no press."""
-    from render.fem.renderer import FemRenderer
-    from render.replay import replay_error, replay_recording
+    from palpate.render.fem.renderer import FemRenderer
+    from palpate.render.replay import replay_error, replay_recording
 
     return replay_error(recording, model.presses, replay_recording(FemRenderer(model), recording)).rmse_n
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 from scipy.special import logit
 
-from mechanics.effects.registry import known
-from mechanics.options import EXACT, option
+from palpate.mechanics.effects.registry import known
+from palpate.mechanics.options import EXACT, option
 
 
 @dataclass(frozen=True)

@@ -6,33 +6,33 @@ import dataclasses
 
 import numpy as np
 
-from diagnose.forward.prediction import build_forward, solved
-from diagnose.forward.touches import REACH_M, reached, touches_of, unobservable_effects
-from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.instrument_effects import (
+from palpate.diagnosis.forward.prediction import build_forward, solved
+from palpate.diagnosis.forward.touches import REACH_M, reached, touches_of, unobservable_effects
+from palpate.diagnosis.instrument.free_air import free_air_of
+from palpate.diagnosis.instrument.instrument_effects import (
     find_instrument_offsets,
     read_sideways,
     ruled_out,
     seen_play,
     with_move,
 )
-from diagnose.instrument.retraced import move_of
-from diagnose.instrument.support_readings import rigid_of
-from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
-from diagnose.search.attribution import attribute
-from diagnose.search.evidence import Search
-from diagnose.search.site_stiffness import site_stiffness_sd
-from diagnose.search.starts import misfit_of
-from diagnose.verdict.answer import Findings
-from diagnose.verdict.conclusion import conclude
-from diagnose.verdict.result import Diagnosis
-from mechanics.effects.base import Role
-from mechanics.effects.registry import effects
-from mechanics.model.model import Model
-from mechanics.presses.table import Presses
-from mechanics.progress import Clock, Progress, part, silent
-from mechanics.recording.recording import Recording
-from reconstruct.presses_on_model import presses_on
+from palpate.diagnosis.instrument.retraced import move_of
+from palpate.diagnosis.instrument.support_readings import rigid_of
+from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from palpate.diagnosis.search.attribution import attribute
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
+from palpate.diagnosis.search.starts import misfit_of
+from palpate.diagnosis.verdict.answer import Findings
+from palpate.diagnosis.verdict.conclusion import conclude
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.progress import Clock, Progress, part, silent
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.presses_on_model import presses_on
 
 
 def diagnose(

@@ -21,14 +21,14 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from diagnose.forward.prediction import Forward
-from mechanics.compliance.pressed_places import Places, solve_places
-from mechanics.effects.registry import NAMES, effect
-from mechanics.frames import tangents
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.making import of_paths
-from mechanics.shape.box_mesh import box_mesh
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.mechanics.compliance.pressed_places import Places, solve_places
+from palpate.mechanics.effects.registry import NAMES, effect
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.making import of_paths
+from palpate.mechanics.shape.box_mesh import box_mesh
 
 FOLDER = Path(__file__).resolve().parent / "images" / "effects"
 MODULUS_PA, NU, TIP_M, RATE_HZ = 20e3, 0.49, 0.005, 500.0

@@ -95,7 +95,7 @@ def options_page() -> str:
 
 def effects_page() -> str:
     """Every effect with its keys, their units and ranges, and what can be done with it."""
-    from mechanics.effects.registry import effects
+    from palpate.mechanics.effects.registry import effects
 
     lines = [
         "# Effects: names and keys",

@@ -22,9 +22,9 @@ COARSE_M = 0.014
 def write(folder: Path) -> None:
     """One page for each object, titled as its scene is."""
     from palpate.exporting.page.document import page_of
-    from render.fem.renderer import FemRenderer
-    from scenes.build import model_of
-    from scenes.scene import load_scene
+    from palpate.render.fem.renderer import FemRenderer
+    from palpate.scenes.build import model_of
+    from palpate.scenes.scene import load_scene
 
     folder.mkdir(parents=True, exist_ok=True)
     for name in OBJECTS:

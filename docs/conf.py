@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pyvista
 
+import palpate
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 import _evidence  # noqa: E402
@@ -34,8 +36,7 @@ suppress_warnings = ["config.cache", "autoapi.python_import_resolution", "ref.py
 
 myst_heading_anchors = 4
 
-ROOMS = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
-autoapi_dirs = [str(ROOT / room) for room in ROOMS]
+autoapi_dirs = [str(Path(palpate.__file__).parent)]  # the installed package, where rooms have their names
 autoapi_root = "reference/rooms"
 autoapi_options = ["members", "undoc-members", "show-module-summary"]
 autoapi_ignore = ["*/benchmarks/*", "*/commands/*"]

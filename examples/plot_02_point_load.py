@@ -11,10 +11,10 @@ with 20 kPa, is worked out both ways on the same meshes of a block.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from mechanics.compliance.sites import touch_sites, touch_solver
-from mechanics.contact.touch import touch_force
-from mechanics.elastic.solver import Solver
-from mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.compliance.sites import touch_sites, touch_solver
+from palpate.mechanics.contact.touch import touch_force
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.shape.box_mesh import box_mesh
 
 MODULUS, NU, RADIUS, DEPTH = 20e3, 0.49, 0.005, 0.005
 SIDE, HEIGHT = 0.06, 0.03

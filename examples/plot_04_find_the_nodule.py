@@ -10,8 +10,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import palpate as pp
-from mechanics.model.material import Ball
-from scenes.phantoms import phantom
+from palpate.mechanics.model.material import Ball
+from palpate.scenes.phantoms import phantom
 
 dome = phantom("dome")
 soft = pp.model_of(dome, dome.young_modulus_pa, mesh_size_m=0.014)

@@ -15,9 +15,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import palpate as pp
-from mechanics.effects import registry
-from mechanics.effects.base import Effect, Parameter, Scope
-from mechanics.effects.settings import SHIFTED
+from palpate.mechanics.effects import registry
+from palpate.mechanics.effects.base import Effect, Parameter, Scope
+from palpate.mechanics.effects.settings import SHIFTED
 
 
 def saturate(force, greatest):
@@ -39,7 +39,7 @@ EFFECT = Effect(
 # In the program an effect is one file, ``mechanics/effects/NAME.py``, and one line in the registry. A
 # script can do the same by hand:
 
-module = ModuleType("mechanics.effects.saturation")
+module = ModuleType("palpate.mechanics.effects.saturation")
 module.EFFECT = EFFECT
 sys.modules[module.__name__] = module
 registry.NAMES = (*registry.NAMES, "saturation")

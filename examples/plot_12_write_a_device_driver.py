@@ -15,8 +15,8 @@ import numpy as np
 import trimesh
 
 import palpate as pp
-from devices.base import DeviceSpec
-from devices.io_thread import ForcefulDevice, Reading
+from palpate.devices.base import DeviceSpec
+from palpate.devices.io_thread import ForcefulDevice, Reading
 
 
 class Handle:

@@ -12,9 +12,9 @@ import sys
 
 import numpy as np
 
-from diagnose.explore.explorer import Suggestion
+from palpate.diagnosis.explore.explorer import Suggestion
 from palpate.robot.laboratory import LaboratoryRobot
-from scenes.phantoms import phantom
+from palpate.scenes.phantoms import phantom
 
 
 def main(output: str, most: int = 8) -> dict:

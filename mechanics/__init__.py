@@ -1,5 +1,5 @@
 """Mechanics: pure arrays and the frozen types that every other package shares. Imports none of them."""
 
-from mechanics.kernel_cache import choose_folder
+from palpate.mechanics.kernel_cache import choose_folder
 
 choose_folder()  # before the first kernel of ours is decorated

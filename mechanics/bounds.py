@@ -5,7 +5,7 @@ Far beyond every device and object: what lies outside is a garbled message, not 
 
 from __future__ import annotations
 
-from mechanics.kernels import kernel
+from palpate.mechanics.kernels import kernel
 
 FARTHEST_M = 100.0
 FASTEST_M_PER_S = 1e4

@@ -3,29 +3,30 @@
 Numba keeps a kernel on disk by the text of its own file and does not see that a kernel it calls, or a number
 it took from another module, has changed. So the folder is named by a hash of every source of ours that holds
 kernels and of what those import: change one, and all are compiled anew. It must be chosen before a kernel is
-decorated, hence from `mechanics/__init__.py`, which every package imports first.
+decorated, hence from `palpate.mechanics`, which every room imports first.
 """
 
 from __future__ import annotations
 
 import hashlib
+import importlib.util
 import os
 import re
 import shutil
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
-from mechanics.disk.scratch import cache_folder
+from palpate.mechanics.disk.scratch import cache_folder
 
-PACKAGES = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
+ROOMS = ("mechanics", "reconstruction", "render", "devices", "diagnosis", "scenes")
+"""The subpackages of `palpate` that stand in folders of their own in a clone."""
 _KEPT = 6  # folders, the newest; several checkouts and versions may take turns
 _VARIABLE = "NUMBA_CACHE_DIR"
-_DECORATORS = (b"njit", b"mechanics.kernels")  # numba's own, and where ours are
+_DECORATORS = (b"njit", b"palpate.mechanics.kernels")  # numba's own, and where ours are
 _IMPORT = re.compile(
-    rb"^(?:from|import)[ \t]+((?:" + "|".join(PACKAGES).encode() + rb")\b[\w.]*)"
-    rb"(?:[ \t]+import[ \t]+(\([^)]*\)|[^\n]*))?",
-    re.MULTILINE,
+    rb"^(?:from|import)[ \t]+(palpate\b[\w.]*)(?:[ \t]+import[ \t]+(\([^)]*\)|[^\n]*))?", re.MULTILINE
 )
 
 
@@ -42,7 +43,7 @@ def choose_folder() -> Path | None:
     if named and Path(named).parent != parent:
         return None
     try:
-        folder = parent / source_key(Path(__file__).resolve().parents[1])
+        folder = parent / source_key(sources())
         _prepare(folder)
     except OSError:
         return None
@@ -53,39 +54,53 @@ def choose_folder() -> Path | None:
     return folder
 
 
-def source_key(root: Path) -> str:
-    """Hash of the kernels' sources below `root`, the folder of the packages: 16 hexadecimal digits.
+def sources() -> dict[str, str]:
+    """Dotted name -> path of every module of ours; a package's name stands for its `__init__`.
+
+    Each package is asked where it stands: in site-packages all lie in one folder, in an editable installation
+    each lies in a folder of the clone.
+    """
+    found: dict[str, str] = {}
+    for name in ("palpate", *(f"palpate.{room}" for room in ROOMS)):
+        spec = importlib.util.find_spec(name)
+        for folder in (spec and spec.submodule_search_locations) or ():
+            found |= _modules(folder, name)
+    return found
+
+
+def source_key(modules: Mapping[str, str]) -> str:
+    """Hash of the kernels' sources among `modules` (dotted name -> path): 16 hexadecimal digits.
 
     Raises OSError where there are none.
     """
     digest = hashlib.sha256()
-    for path, text in sorted(kernel_sources(root).items()):
-        digest.update(os.path.relpath(path, root).encode() + b"\0" + text + b"\0")
+    for name, text in sorted(kernel_sources(modules).items()):
+        digest.update(name.encode() + b"\0" + text + b"\0")
     return digest.hexdigest()[:16]
 
 
-def kernel_sources(root: Path) -> dict[str, bytes]:
-    """Path -> text of every source of ours that holds kernels, and of what those import at their top.
+def kernel_sources(modules: Mapping[str, str]) -> dict[str, bytes]:
+    """Dotted name -> text of every module that holds kernels, and of those that they import at their top.
 
     Imports count because kernels freeze the numbers that they find. Raises OSError where there are none.
     """
-    folders = [os.path.join(root, package) for package in PACKAGES]
-    sources = {path: _read(path) for folder in folders for path in _python_files(folder)}
-    taken = {path for path, text in sources.items() if any(word in text for word in _DECORATORS)}
+    texts = {name: _read(path) for name, path in modules.items()}
+    taken = {name for name, text in texts.items() if any(word in text for word in _DECORATORS)}
     if not taken:
-        raise OSError(f"no kernels below '{root}'")
-    for path in tuple(taken):
-        taken.update(p for name in _imported(sources[path]) for p in _files_of(root, name) if p in sources)
-    return {path: sources[path] for path in taken}
+        raise OSError(f"no kernels among {len(modules)} modules")
+    for name in tuple(taken):
+        taken |= _imported(texts[name]) & texts.keys()
+    return {name: texts[name] for name in taken}
 
 
-def _python_files(folder: str) -> list[str]:
-    found = []
-    for entry in os.scandir(folder) if os.path.isdir(folder) else ():
-        if entry.name.endswith(".py"):
-            found.append(entry.path)
-        elif entry.is_dir() and entry.name != "__pycache__":
-            found += _python_files(entry.path)
+def _modules(folder: str, package: str) -> dict[str, str]:
+    found = {}
+    for entry in os.scandir(folder):
+        stem, ending = os.path.splitext(entry.name)
+        if ending == ".py":
+            found[package if stem == "__init__" else f"{package}.{stem}"] = entry.path
+        elif entry.is_dir() and stem.isidentifier() and stem != "__pycache__":
+            found |= _modules(entry.path, f"{package}.{stem}")
     return found
 
 
@@ -105,11 +120,6 @@ def _imported(text: bytes) -> set[str]:
         names.add(base)
         names |= {f"{base}.{word.decode()}" for word in re.findall(rb"\w+", words)}
     return names
-
-
-def _files_of(root: Path, name: str) -> tuple[str, str]:
-    path = os.path.join(root, *name.split("."))
-    return path + ".py", os.path.join(path, "__init__.py")
 
 
 def _prepare(folder: Path) -> None:

@@ -16,8 +16,6 @@ from numba import njit, typeof, types
 from numba.core.options import DefaultOptions
 from numba.core.targetconfig import TargetConfig
 
-from mechanics.kernel_cache import PACKAGES
-
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 if hasattr(DefaultOptions, "_nrt"):
     _OPTIONS["_nrt"] = False
@@ -106,7 +104,7 @@ def kept(function: Any, *arguments: Any) -> Any:
 
 
 def _is_ours(argument: Any) -> bool:
-    return type(argument).__module__.split(".")[0] in PACKAGES
+    return type(argument).__module__.partition(".")[0] == "palpate"
 
 
 @cache

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError
 
 
 def pairs(given: Mapping[str, Any] | Iterable[str] | None, flag: str, example: str) -> list[tuple[str, Any]]:

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from numbers import Real
 from typing import Any
 
-from mechanics.disk.schema import span
-from mechanics.errors import OptionError
-from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.mechanics.disk.schema import span
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 
 EXACT = "solve each touched place in place of reading the table (some 10 s of processor time a place)"
 """Help of `exact`, wherever it is an option."""

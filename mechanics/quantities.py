@@ -13,8 +13,8 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from mechanics.disk.schema import Key
-from mechanics.errors import OptionError
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.errors import OptionError
 
 YOUNG_MODULUS = Key(low=1.0, high=1e9, unit="Pa", required=True)
 """From the softest gel to stiff rubber."""

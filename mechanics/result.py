@@ -10,7 +10,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError
 
 _PLAIN = (str, bool, int, float)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Self
 
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s5_mesh.meshing import Meshing, MeshingOptions, as_meshed, fill
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s5_mesh.meshing import Meshing, MeshingOptions, as_meshed, fill
 
 
 class BackgroundMesher:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
-from mechanics.contact.depth_factors import DepthFactors
-from mechanics.contact.touch import TouchedPlaces
-from mechanics.errors import OptionError
-from mechanics.options import option
-from mechanics.press_solver.solved_places import (
+from palpate.mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
+from palpate.mechanics.contact.depth_factors import DepthFactors
+from palpate.mechanics.contact.touch import TouchedPlaces
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import option
+from palpate.mechanics.press_solver.solved_places import (
     ExactPresses,
     Touched,
     check_laws,
@@ -21,22 +21,22 @@ from mechanics.press_solver.solved_places import (
     said_beforehand,
     solve_touched,
 )
-from mechanics.presses.table import Presses
-from mechanics.progress import Clock, Progress, part
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.geometry.in_device_frame import Placed
-from reconstruct.geometry.stated import GeometryOptions
-from reconstruct.steps.s1_filter.low_pass import FilterOptions
-from reconstruct.steps.s2_base.boundary import BoundaryOptions
-from reconstruct.steps.s3_contacts.contacts import ContactOptions
-from reconstruct.steps.s4_surface.casting import CastPoints
-from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions
-from reconstruct.steps.s5_mesh.meshing import MeshingOptions, uncertainty_at
-from reconstruct.steps.s6_one_d.one_d import fit_paper, fit_robust
-from reconstruct.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
-from reconstruct.steps.s7_modulus.modulus_field import FieldOptions
-from reconstruct.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
-from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.progress import Clock, Progress, part
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.geometry.in_device_frame import Placed
+from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions
+from palpate.reconstruction.steps.s2_base.boundary import BoundaryOptions
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions
+from palpate.reconstruction.steps.s4_surface.casting import CastPoints
+from palpate.reconstruction.steps.s4_surface.surface import Surface, SurfaceOptions
+from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, uncertainty_at
+from palpate.reconstruction.steps.s6_one_d.one_d import fit_paper, fit_robust
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
+from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions
+from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
+from palpate.reconstruction.steps.s7_modulus.shape_error import compliance_covariance
 
 METHODS = ("finite-tip", "paper")
 

@@ -11,40 +11,45 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.contact.linear_range import linear_range
-from mechanics.disk.toml_text import plain
-from mechanics.errors import ContactError, NoBaseError, OptionError
-from mechanics.model.files import read_model
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.progress import Clock, Progress, part, silent, unsaid
-from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
-from mechanics.recording.recording import Recording, base_model_of
-from mechanics.result import Result
-from reconstruct.background_mesher import BackgroundMesher
-from reconstruct.checks.finding import Finding
-from reconstruct.checks.outcome import outcome_of
-from reconstruct.checks.registry import Checkup
-from reconstruct.geometry.in_device_frame import Placed, nowhere
-from reconstruct.geometry.known_base import base_of_model
-from reconstruct.geometry.known_shape import place
-from reconstruct.geometry.stated import GeometryOptions, stated_geometry
-from reconstruct.methods import BY_NAME, Body, Fitted, Method, Solved
-from reconstruct.methods import ReconstructOptions as ReconstructOptions
-from reconstruct.steps.s2_base.boundary import Boundary
-from reconstruct.steps.s3_contacts.contacts import Exploration, explore
-from reconstruct.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
-from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
-from reconstruct.steps.s3_contacts.straightened import laid
-from reconstruct.steps.s4_surface.casting import CastPoints, cast
-from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
-from reconstruct.steps.s5_mesh.meshing import Meshing, uncertainty_at
-from reconstruct.steps.s6_one_d.one_d import OneD, columns, profiles
-from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
-from reconstruct.steps.s7_modulus.modulus import ModulusFit
-from reconstruct.steps.s7_modulus.modulus_field import with_fitted_field
-from reconstruct.steps.s7_modulus.modulus_paper import PaperFit
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.contact.linear_range import linear_range
+from palpate.mechanics.disk.toml_text import plain
+from palpate.mechanics.errors import ContactError, NoBaseError, OptionError
+from palpate.mechanics.model.files import read_model
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
+from palpate.mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
+from palpate.mechanics.recording.recording import Recording, base_model_of
+from palpate.mechanics.result import Result
+from palpate.reconstruction.background_mesher import BackgroundMesher
+from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.outcome import outcome_of
+from palpate.reconstruction.checks.registry import Checkup
+from palpate.reconstruction.geometry.in_device_frame import Placed, nowhere
+from palpate.reconstruction.geometry.known_base import base_of_model
+from palpate.reconstruction.geometry.known_shape import place
+from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
+from palpate.reconstruction.methods import BY_NAME, Body, Fitted, Method, Solved
+from palpate.reconstruction.methods import ReconstructOptions as ReconstructOptions
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
+from palpate.reconstruction.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
+from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points, is_points
+from palpate.reconstruction.steps.s3_contacts.straightened import laid
+from palpate.reconstruction.steps.s4_surface.casting import CastPoints, cast
+from palpate.reconstruction.steps.s4_surface.surface import (
+    Surface,
+    evidence_of,
+    reconstruct_surface,
+    shape_table,
+)
+from palpate.reconstruction.steps.s5_mesh.meshing import Meshing, uncertainty_at
+from palpate.reconstruction.steps.s6_one_d.one_d import OneD, columns, profiles
+from palpate.reconstruction.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
+from palpate.reconstruction.steps.s7_modulus.modulus_field import with_fitted_field
+from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from mechanics.errors import OptionError
-from mechanics.kernels import kept, loop_kernel, pointer
-from mechanics.model.model import Model
-from render.surface.contact_surface import ContactSurface
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.kernels import kept, loop_kernel, pointer
+from palpate.mechanics.model.model import Model
+from palpate.render.surface.contact_surface import ContactSurface
 
 
 class State(NamedTuple):

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.effects.laws_along_path import PathNumbers, path_numbers
-from mechanics.effects.registry import effects
-from mechanics.effects.settings import STICKS, Touch
-from mechanics.model.model import Model
-from render.options import RenderOptions
+from palpate.mechanics.effects.laws_along_path import PathNumbers, path_numbers
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.effects.settings import STICKS, Touch
+from palpate.mechanics.model.model import Model
+from palpate.render.options import RenderOptions
 
 STICKING = 1.0
 """Enough for every press of a hand to stick, as the ideal tip does; a tip that is dragged along slides all

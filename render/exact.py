@@ -13,21 +13,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.effects.adhesion import EFFECT as ADHESION
-from mechanics.effects.compliant_base import EFFECT as YIELDING_BASE
-from mechanics.effects.jkr_adhesion import EFFECT as JKR
-from mechanics.effects.skin_layer import EFFECT as SKIN
-from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
-from mechanics.effects.unbonded_base import EFFECT as UNBONDED
-from mechanics.errors import OptionError
-from mechanics.press_solver.press import PressOptions
-from mechanics.press_solver.solved_places import PlacesLeft, SolvedPlace, SolvedPresses, check_laws, felt_of
-from mechanics.presses.table import Presses
-from mechanics.progress import Progress, silent
-from render.base import Renderer
-from render.effects import STICKING, rendered_touch
-from render.fem.renderer import FemRenderer
-from render.force_error import force_errors
+from palpate.mechanics.effects.adhesion import EFFECT as ADHESION
+from palpate.mechanics.effects.compliant_base import EFFECT as YIELDING_BASE
+from palpate.mechanics.effects.jkr_adhesion import EFFECT as JKR
+from palpate.mechanics.effects.skin_layer import EFFECT as SKIN
+from palpate.mechanics.effects.strain_stiffening import EFFECT as STIFFENING
+from palpate.mechanics.effects.unbonded_base import EFFECT as UNBONDED
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.press_solver.press import PressOptions
+from palpate.mechanics.press_solver.solved_places import (
+    PlacesLeft,
+    SolvedPlace,
+    SolvedPresses,
+    check_laws,
+    felt_of,
+)
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.progress import Progress, silent
+from palpate.render.base import Renderer
+from palpate.render.effects import STICKING, rendered_touch
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.force_error import force_errors
 
 UNSOLVED = (ADHESION.name, JKR.name, SKIN.name, YIELDING_BASE.name, UNBONDED.name)
 """Effects of a model that the solver of a press does not know."""

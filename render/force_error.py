@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.contact.edges import nearness
-from mechanics.quantities import USUAL_POISSON_RATIO
-from render.base import Renderer
-from render.fem.renderer import FemRenderer
-from render.surface.felt_surface import felt_surface
-from render.surface.snapping import ONSET_NOISE_M
+from palpate.mechanics.contact.edges import nearness
+from palpate.mechanics.quantities import USUAL_POISSON_RATIO
+from palpate.render.base import Renderer
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.surface.felt_surface import felt_surface
+from palpate.render.surface.snapping import ONSET_NOISE_M
 
 FLOOR, DEEP_SHARE, BENT_SHARE, SIDEWAYS_SHARE = 0.02, 0.02, 0.03, 0.1
 RIM_SHARE, BASE_SHARE = 0.2, 0.6

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mechanics.contact.dent import dent_laws
-from mechanics.errors import OptionError
-from mechanics.options import option
+from palpate.mechanics.contact.dent import dent_laws
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import option
 
 DOCUMENTED, BEST = SETTINGS = ("documented", "best")
 """Of another simulator: as its own documentation says, or as good as it gets."""

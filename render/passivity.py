@@ -26,10 +26,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.bounds import FARTHEST_M, LARGEST_N, within
-from mechanics.errors import OptionError
-from mechanics.kernels import inner, kernel
-from mechanics.options import check_ranges, option
+from palpate.mechanics.bounds import FARTHEST_M, LARGEST_N, within
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.kernels import inner, kernel
+from palpate.mechanics.options import check_ranges, option
 
 LONGEST_DELAY_TICKS = 64
 MOST_OWED_J = 2e-3

@@ -15,20 +15,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.disk.reading import read_text
-from mechanics.disk.writing import Kind, atomic_file
-from mechanics.errors import OptionError, RecordingError
-from mechanics.quantities import TIP_RADIUS
-from mechanics.result import Result
-from render.base import Renderer
-from render.force_error import error_figures, force_errors
-from render.scene import TouchScene, scene_of
-from render.surface.bvh import STACK, closest_triangle
-from render.surface.contact_surface import SurfaceArrays
-from render.surface.walking import foot
+from palpate.mechanics.disk.reading import read_text
+from palpate.mechanics.disk.writing import Kind, atomic_file
+from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.quantities import TIP_RADIUS
+from palpate.mechanics.result import Result
+from palpate.render.base import Renderer
+from palpate.render.force_error import error_figures, force_errors
+from palpate.render.scene import TouchScene, scene_of
+from palpate.render.surface.bvh import STACK, closest_triangle
+from palpate.render.surface.contact_surface import SurfaceArrays
+from palpate.render.surface.walking import foot
 
 if TYPE_CHECKING:
-    from render.exact import ExactPlaces, SolvedPlace
+    from palpate.render.exact import ExactPlaces, SolvedPlace
 
 COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
 CURVE = Kind("a curve of palpate press", (",".join(COLUMNS).encode(),))

@@ -5,28 +5,28 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from mechanics.errors import OptionError
-from mechanics.progress import Progress, silent
-from render.options import RenderOptions
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.progress import Progress, silent
+from palpate.render.options import RenderOptions
 
 if TYPE_CHECKING:
-    from mechanics.model.model import Model
-    from render.base import Renderer
+    from palpate.mechanics.model.model import Model
+    from palpate.render.base import Renderer
 
 RENDERERS = {
-    "fem": "render.fem.renderer",
-    "kelvin-voigt": "render.one_d.renderer",
-    "hunt-crossley": "render.one_d.renderer",
-    "hunt-crossley-undamped": "render.one_d.renderer",
-    "hunt-crossley-kh": "render.one_d.renderer",
+    "fem": "palpate.render.fem.renderer",
+    "kelvin-voigt": "palpate.render.one_d.renderer",
+    "hunt-crossley": "palpate.render.one_d.renderer",
+    "hunt-crossley-undamped": "palpate.render.one_d.renderer",
+    "hunt-crossley-kh": "palpate.render.one_d.renderer",
 }
 """Our own."""
 
 _SIMULATORS = {
-    "scikit-fem": "render.simulators.scikit_fem",
-    "mujoco": "render.simulators.mujoco",
-    "drake": "render.simulators.drake",
-    "newton": "render.simulators.newton",
+    "scikit-fem": "palpate.render.simulators.scikit_fem",
+    "mujoco": "palpate.render.simulators.mujoco",
+    "drake": "palpate.render.simulators.drake",
+    "newton": "palpate.render.simulators.newton",
 }
 """Other simulators, which need packages of their own and take their time."""
 
@@ -44,7 +44,7 @@ def simulator_names() -> tuple[str, ...]:
 def check_settings(name: str, settings: str, numbers: str) -> None:
     """Raise OptionError for numbers (KEY=VALUE, comma separated) that a simulator's settings do not have,
     before any work."""
-    from render.simulators.base import changed
+    from palpate.render.simulators.base import changed
 
     changed(importlib.import_module(_SIMULATORS[name]).SETTINGS[settings], numbers)
 

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.disk.writing import Kind, atomic_file
-from mechanics.errors import OptionError
-from mechanics.model.model import Model
-from mechanics.presses.table import LEAD_S, Presses
-from mechanics.progress import Progress, Remaining, silent
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import runs
-from mechanics.result import Result
-from render.base import Renderer
-from render.force_error import error_figures, force_errors
-from render.scene import TouchScene, scene_of
+from palpate.mechanics.disk.writing import Kind, atomic_file
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.presses.table import LEAD_S, Presses
+from palpate.mechanics.progress import Progress, Remaining, silent
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import runs
+from palpate.mechanics.result import Result
+from palpate.render.base import Renderer
+from palpate.render.force_error import error_figures, force_errors
+from palpate.render.scene import TouchScene, scene_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from render.exact import ExactReplay
+    from palpate.render.exact import ExactReplay
 
 FORCES = Kind("a file of palpate replay", (b"t,fx,fy,fz",))
 _CHUNK, _TOLD = 4000, 100

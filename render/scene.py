@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechanics.model.model import Model
-from render.base import Renderer
-from render.support import (
+from palpate.mechanics.model.model import Model
+from palpate.render.base import Renderer
+from palpate.render.support import (
     SupportOptions,
     SupportParameters,
     add_support_path,

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from mechanics.kernels import inner, kernel
-from mechanics.options import check_ranges, option
+from palpate.mechanics.kernels import inner, kernel
+from palpate.mechanics.options import check_ranges, option
 
 if TYPE_CHECKING:
-    from mechanics.model.model import Model
+    from palpate.mechanics.model.model import Model
 
 CREEP_M_PER_S = 0.005
 """Below this speed friction falls off linearly, so that it does not chatter at rest."""

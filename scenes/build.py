@@ -17,25 +17,25 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.reading import reading
-from mechanics.disk.scratch import cache_folder
-from mechanics.disk.surface_files import surface_of
-from mechanics.disk.writing import atomic_folder
-from mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
-from mechanics.model.files import MODEL, read_model, write_model
-from mechanics.model.material import Ball, Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.progress import Progress, silent
-from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
-from mechanics.recording.files import recording_files
-from mechanics.recording.recording import read_recording
-from mechanics.shape.flat_foot import Standing, standing
-from mechanics.shape.true_shape import TrueShape
-from scenes.embedded import embedded_names, embedded_recording
-from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
-from scenes.scene import Scene, ball_of
-from scenes.shipped import DamagedError, shipped_model, unpack
-from scenes.virtual_presses import palpate_model
+from palpate.mechanics.disk.reading import reading
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.disk.surface_files import surface_of
+from palpate.mechanics.disk.writing import atomic_folder
+from palpate.mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
+from palpate.mechanics.model.files import MODEL, read_model, write_model
+from palpate.mechanics.model.material import Ball, Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
+from palpate.mechanics.recording.files import recording_files
+from palpate.mechanics.recording.recording import read_recording
+from palpate.mechanics.shape.flat_foot import Standing, standing
+from palpate.mechanics.shape.true_shape import TrueShape
+from palpate.scenes.embedded import embedded_names, embedded_recording
+from palpate.scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
+from palpate.scenes.scene import Scene, ball_of
+from palpate.scenes.shipped import DamagedError, shipped_model, unpack
+from palpate.scenes.virtual_presses import palpate_model
 
 VERSION = 7
 MESH_SIZE_M, LEAST_EDGES = 0.010, 8
@@ -188,9 +188,9 @@ def _built(
 ) -> Model:
     """The model of a shape that stands in its own frame; own: its material where the scene says nothing."""
     # here, and below: a model that is kept or shipped is opened without loading what makes one
-    from reconstruct.shapes.coarse_drawing import decimated
-    from reconstruct.steps.s4_surface.surface import Surface
-    from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
+    from palpate.reconstruction.shapes.coarse_drawing import decimated
+    from palpate.reconstruction.steps.s4_surface.surface import Surface
+    from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
 
     surface = Surface(
         vertices=stood.vertices,
@@ -233,7 +233,7 @@ def _balls(regions: Collection[Region]) -> dict[str, Ball]:
 
 
 def _from_recording(scene: Scene, progress: Progress) -> Model:
-    from reconstruct.pipeline import reconstruct
+    from palpate.reconstruction.pipeline import reconstruct
 
     return _changed(scene, reconstruct(read_recording(_recording_path(scene)), progress=progress))
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mechanics.errors import SceneError
-from mechanics.names import unknown
+from palpate.mechanics.errors import SceneError
+from palpate.mechanics.names import unknown
 
 FOLDER = Path(__file__).parent / "recordings"
 DEFAULT = "silicone-1-cylinder"

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from devices.intention import Path
-from mechanics.errors import SceneError
-from mechanics.model.model import Model
-from mechanics.options import option
-from mechanics.shape.nearest import closest
-from scenes.virtual_presses import spread_places
+from palpate.devices.intention import Path
+from palpate.mechanics.errors import SceneError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.options import option
+from palpate.mechanics.shape.nearest import closest
+from palpate.scenes.virtual_presses import spread_places
 
 ANGLES = 180
 

@@ -24,16 +24,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from devices.mapper import MapperOptions, axis_matrix
-from mechanics.disk.reading import named_in, read_toml
-from mechanics.disk.schema import Key, Listed, Schema, check_table
-from mechanics.disk.surface_files import SUFFIXES, is_surface_file
-from mechanics.errors import OptionError, SceneError
-from mechanics.model.material import BALL, Ball
-from mechanics.names import unknown
-from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
-from scenes.embedded import embedded_names, embedded_recording
-from scenes.phantoms import PHANTOMS, Region
+from palpate.devices.mapper import MapperOptions, axis_matrix
+from palpate.mechanics.disk.reading import named_in, read_toml
+from palpate.mechanics.disk.schema import Key, Listed, Schema, check_table
+from palpate.mechanics.disk.surface_files import SUFFIXES, is_surface_file
+from palpate.mechanics.errors import OptionError, SceneError
+from palpate.mechanics.model.material import BALL, Ball
+from palpate.mechanics.names import unknown
+from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.scenes.embedded import embedded_names, embedded_recording
+from palpate.scenes.phantoms import PHANTOMS, Region
 
 FOLDER = Path(__file__).parent
 COLOURS = ("displacement", "stiffness")

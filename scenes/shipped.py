@@ -21,12 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.stored_compliance import compliance_file
-from mechanics.compliance.surface_compliance import SurfaceCompliance
-from mechanics.disk.store import write_arrays
-from mechanics.disk.writing import atomic_folder
-from mechanics.errors import FileError
-from mechanics.model.files import MODEL
+from palpate.mechanics.compliance.stored_compliance import compliance_file
+from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
+from palpate.mechanics.disk.store import write_arrays
+from palpate.mechanics.disk.writing import atomic_folder
+from palpate.mechanics.errors import FileError
+from palpate.mechanics.model.files import MODEL
 
 
 class DamagedError(FileError):

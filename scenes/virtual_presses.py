@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
-from mechanics.contact.touch import forces_at
-from mechanics.errors import SceneError
-from mechanics.model.model import Model
-from mechanics.presses.making import of_paths
-from mechanics.progress import Progress, silent
+from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.errors import SceneError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.presses.making import of_paths
+from palpate.mechanics.progress import Progress, silent
 
 SITES = 32
 DEPTH_M = 0.005
@@ -31,7 +31,10 @@ def palpate_model(
     model: Model, progress: Progress = silent, *, sites: int = SITES, depth_m: float = DEPTH_M
 ) -> Model:
     """The model with a table of presses: one to `depth_m` at each of `sites` places."""
-    from reconstruct.steps.s6_one_d.one_d import columns, fit_robust  # here: a touch spreads places alone
+    from palpate.reconstruction.steps.s6_one_d.one_d import (  # here: a touch spreads places alone
+        columns,
+        fit_robust,
+    )
 
     chosen = spread_places(model, sites)
     points, normals = model.mesh.points[chosen], model.normals[chosen]

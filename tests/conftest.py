@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,7 +20,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-import mechanics  # noqa: E402, F401  where compiled kernels are kept, before a test decorates one
+from palpate.mechanics.kernel_cache import sources  # noqa: E402  mechanics chooses where kernels are kept, before a test decorates one
 
 from .support.once import compile_one_at_a_time, one_at_a_time  # noqa: E402
 
@@ -37,6 +39,52 @@ def pytest_collection() -> Iterator[None]:
 
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+
+
+def pytest_sessionstart() -> None:
+    """Stop where the installed `palpate` is not this checkout's: its tests would say nothing of it."""
+    if not WORKER and (other := other_than(REPOSITORY)):
+        pytest.exit(
+            f"{len(other)} modules of the installed palpate differ from this checkout's ({other[0]}, ...): "
+            f"remove '{REPOSITORY / 'build'}' and run '{sys.executable} -m pip install {REPOSITORY}'",
+            returncode=4,
+        )
+
+
+def pytest_sessionfinish() -> None:
+    """A folder of the checkout is no package: what imports it as one would load it a second time."""
+    bare = {
+        "mechanics",
+        "reconstruct",
+        "render",
+        "devices",
+        "diagnose",
+        "scenes",
+        "shell",
+    } & sys.modules.keys()
+    assert not bare, f"imported beside palpate: {bare}"
+
+
+def other_than(clone: Path) -> list[str]:
+    """Modules that the installed `palpate` and the clone do not have alike."""
+    ours = {name: path.read_bytes() for name, path in modules_of(clone).items()}
+    installed = {name: Path(path).read_bytes() for name, path in sources().items()}
+    return sorted(name for name in ours.keys() | installed.keys() if ours.get(name) != installed.get(name))
+
+
+def modules_of(clone: Path) -> dict[str, Path]:
+    """Dotted name -> file of every module that the clone's `setup.py` installs."""
+    folders = re.search(
+        r"^FOLDERS = (\{.*?^\})", (clone / "setup.py").read_text(encoding="utf-8"), re.M | re.S
+    )
+    assert folders, "setup.py says which folder is which package"
+    return {
+        ".".join([package, *path.relative_to(clone / folder).with_suffix("").parts]).removesuffix(
+            ".__init__"
+        ): path
+        for package, folder in ast.literal_eval(folders[1]).items()
+        for path in (clone / folder).rglob("*.py")
+    }
 
 
 def _shared(name: str, words: str) -> Path:
@@ -66,5 +114,5 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def nothing_to_press(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reports do not carry the page of their object: seconds each, and tested in tests/palpate/exporting."""
+    """Reports do not carry the page of their object: seconds each, and tested in tests/shell/exporting."""
     monkeypatch.setattr("palpate.exporting.page.button.button", lambda model: "")

@@ -17,14 +17,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks._servo_load import block_model
-from mechanics.disk.schema import Key
-from mechanics.errors import DeviceError, ModelError, PalpateError, RecordingError, SceneError
-from mechanics.model.files import SCHEMA as OF_MODEL
-from mechanics.model.files import read_model, write_model
-from mechanics.recording import recording as of_recording
-from mechanics.recording.recording import read_recording
-from scenes.scene import SCHEMA as OF_SCENE
-from scenes.scene import load_scene
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.errors import DeviceError, ModelError, PalpateError, RecordingError, SceneError
+from palpate.mechanics.model.files import SCHEMA as OF_MODEL
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.recording import recording as of_recording
+from palpate.mechanics.recording.recording import read_recording
+from palpate.scenes.scene import SCHEMA as OF_SCENE
+from palpate.scenes.scene import load_scene
 
 from .support.device_bytes import STATE, tried
 from .support.mutations import MUTATIONS, OF_SAMPLES
@@ -157,7 +157,7 @@ def test_hostile_bytes_of_devices(seed):
 @given(st.binary(max_size=200))
 @settings(max_examples=300, deadline=None, derandomize=True)
 def test_no_bytes_at_all_of_devices(data):
-    from devices.codecs import haply, hid_descriptor, pid, spacemouse
+    from palpate.devices.codecs import haply, hid_descriptor, pid, spacemouse
 
     spacemouse.decode(data, spacemouse.Deflection())
     haply.number(data), haply.version(data), haply.spelling(data), haply.event_fault(data)
@@ -171,7 +171,7 @@ def test_no_bytes_at_all_of_devices(data):
 
 
 def test_a_message_nested_by_thousands_and_one_of_no_numbers():
-    from devices.codecs import haply
+    from palpate.devices.codecs import haply
 
     for data in (b"[" * 100_000, STATE.replace(b"0.03", b"NaN"), STATE.replace(b"0.03", b"1" + b"0" * 400)):
         with pytest.raises(DeviceError):
@@ -180,7 +180,7 @@ def test_a_message_nested_by_thousands_and_one_of_no_numbers():
 
 
 def test_a_descriptor_that_declares_gigabytes():
-    from devices.codecs.hid_descriptor import parse
+    from palpate.devices.codecs.hid_descriptor import parse
 
     for data in ("0501 77ffffff7f 9501 8102", "0501 7508 97ffffff7f 8102", "87ffff0000 7508 9501 8102"):
         with pytest.raises(DeviceError, match="impossible report"):

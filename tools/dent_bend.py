@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from pypardiso import PyPardisoSolver
 
-from mechanics.compliance.patch import half_space_compliance
-from mechanics.contact.dent import dent_law, effective_radius, grid
-from mechanics.disk.writing import atomic_file
+from palpate.mechanics.compliance.patch import half_space_compliance
+from palpate.mechanics.contact.dent import dent_law, effective_radius, grid
+from palpate.mechanics.disk.writing import atomic_file
 from tools.dent_half_space import COARSE, Grading, HalfSpace, lagrange, rule
 from tools.dent_table import Press
 from tools.script import script
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reach", type=float, default=REACH, help="of a bump, in tip radii")
     parser.add_argument("--until", type=float, default=1.9, help="greatest depth over the tip's radius")
     parser.add_argument(
-        "-o", "--output", help="CSV of dent / effective radius and g (mechanics.contact.dent)"
+        "-o", "--output", help="CSV of dent / effective radius and g (palpate.mechanics.contact.dent)"
     )
 
 

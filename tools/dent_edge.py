@@ -17,14 +17,14 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from benchmarks.felt_surface import meshed
-from mechanics.compliance.patch import usual_width
-from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.contact.edges import fitted, laid
-from mechanics.contact.touch import TouchedPlaces, touch_forces
-from mechanics.disk.writing import atomic_file
-from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.patch import usual_width
+from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from palpate.mechanics.contact.edges import fitted, laid
+from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.press_solver.press import PressOptions, PressSolver
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
 from tools.script import script
 
 RADIUS_M, NU = 5e-3, 0.49
@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--layers", type=float, nargs="*", default=list(LAYERS_M), help="for the base: how thick, m"
     )
     parser.add_argument("--seed", type=int, default=0, help="of where along the edges (default: 0)")
-    parser.add_argument("-o", "--output", help="CSV of widths and amounts (mechanics.contact.edges)")
+    parser.add_argument("-o", "--output", help="CSV of widths and amounts (palpate.mechanics.contact.edges)")
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import numpy as np
 import scipy.sparse as sp
 from pypardiso import PyPardisoSolver
 
-from mechanics.effects.strain_stiffening import hardening
-from mechanics.elastic.elasticity import lame_parameters
+from palpate.mechanics.effects.strain_stiffening import hardening
+from palpate.mechanics.elastic.elasticity import lame_parameters
 
 
 def graded(fine: float, fine_until: float, ratio: float, end: float) -> np.ndarray:

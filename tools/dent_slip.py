@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.press_solver import RADIUS_M, Block
-from mechanics.disk.writing import atomic_file
-from mechanics.press_solver.press import PressOptions
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.press_solver.press import PressOptions
 from tools.script import script
 
 DEPTHS = np.array([0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5])

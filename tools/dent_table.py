@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from pypardiso import PyPardisoSolver
 
-from mechanics.contact.dent import dent_law, grid
-from mechanics.disk.writing import atomic_file
+from palpate.mechanics.contact.dent import dent_law, grid
+from palpate.mechanics.disk.writing import atomic_file
 from tools.dent_half_space import COARSE, FINE, Grading, HalfSpace
 from tools.script import script
 
@@ -35,7 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--element", type=float, default=0.06, help="smallest element over the tip's radius")
     parser.add_argument("--until", type=float, default=2.0, help="greatest depth over the tip's radius")
-    parser.add_argument("-o", "--output", help="CSV of depth / R, c and alpha (mechanics.contact.dent)")
+    parser.add_argument(
+        "-o", "--output", help="CSV of depth / R, c and alpha (palpate.mechanics.contact.dent)"
+    )
 
 
 class Press:

@@ -19,10 +19,10 @@ import numpy as np
 from scipy.special import expit
 
 from benchmarks.timing import table
-from diagnose.search.naming import WEIGHTS
-from diagnose.verdict.corrections import SURENESS_FILE, UNNAMED, how_named
-from mechanics.effects.registry import effect
-from mechanics.errors import OptionError
+from palpate.diagnosis.search.naming import WEIGHTS
+from palpate.diagnosis.verdict.corrections import SURENESS_FILE, UNNAMED, how_named
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
 from tools.script import script
 

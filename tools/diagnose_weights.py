@@ -19,9 +19,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from benchmarks.timing import table
-from diagnose.search.naming import FILE, WEIGHTS
-from mechanics.effects.registry import effects
-from mechanics.errors import OptionError
+from palpate.diagnosis.search.naming import FILE, WEIGHTS
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
 from tools.script import script
 

@@ -18,19 +18,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.palpate.window.driven import Driven, as_the_ghost_says
 
-from devices.channel import PoseChannel
-from devices.registry import DeviceChoice
-from diagnose.explore.explorer import Explorer
-from diagnose.explore.goals import GoalOptions
-from diagnose.explore.segments import Instrument
-from mechanics.disk.writing import PNG, atomic_file
+from palpate.devices.channel import PoseChannel
+from palpate.devices.registry import DeviceChoice
+from palpate.diagnosis.explore.explorer import Explorer
+from palpate.diagnosis.explore.goals import GoalOptions
+from palpate.diagnosis.explore.segments import Instrument
+from palpate.mechanics.disk.writing import PNG, atomic_file
+from palpate.scenes.build import model_of
+from palpate.scenes.scene import load_scene
 from palpate.window.guide import Guide
 from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.window import TouchWindow
-from scenes.build import model_of
-from scenes.scene import load_scene
-from tests.palpate.window.driven import Driven, as_the_ghost_says
 from tools.script import script
 
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "guided-session.png"

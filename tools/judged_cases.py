@@ -9,8 +9,8 @@ from typing import Any
 
 from benchmarks._diagnosis_blind import opened_case, verdict_path
 from benchmarks._diagnosis_cases import Case, cases
-from mechanics.disk.writing import atomic_file
-from mechanics.errors import OptionError
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.errors import OptionError
 
 
 def add_opened_arguments(parser: argparse.ArgumentParser, file: Path) -> None:

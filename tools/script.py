@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from types import ModuleType
 
-from mechanics.errors import PalpateError
+from palpate.mechanics.errors import PalpateError
 from palpate.operations._to_argparse import OneLineParser
 from palpate.output import emit_json
 

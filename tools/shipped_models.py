@@ -16,15 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.stored_compliance import compliance_key, load_or_condense
-from mechanics.model.files import write_model
-from mechanics.model.model import Model
-from render.fem.renderer import FemRenderer
-from render.surface.felt_surface import with_own_stiffness
-from scenes.build import folder_name, model_of
-from scenes.scene import FOLDER as SCENES
-from scenes.scene import read_scene
-from scenes.shipped import FOLDER, pack
+from palpate.mechanics.compliance.stored_compliance import compliance_key, load_or_condense
+from palpate.mechanics.model.files import write_model
+from palpate.mechanics.model.model import Model
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.surface.felt_surface import with_own_stiffness
+from palpate.scenes.build import folder_name, model_of
+from palpate.scenes.scene import FOLDER as SCENES
+from palpate.scenes.scene import read_scene
+from palpate.scenes.shipped import FOLDER, pack
 from tools.script import script
 
 SHIPPED = ("demo", "nodule")

@@ -14,15 +14,13 @@ import threading
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import groupby
-from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from mechanics.kernel_cache import PACKAGES
 from palpate import cli
+from palpate.mechanics.kernel_cache import sources
 from tools.script import script
 
-ROOT = Path(cli.__file__).parents[1]
 _OF_FUNCTIONS = 0x1  # code flag: bodies of modules and classes lack it
 
 
@@ -31,8 +29,8 @@ class Walk:
 
     def __init__(self) -> None:
         self.files: dict[str, str] = {}
-        """File below ROOT -> the function by which it was entered."""
-        self._homes = tuple(f"{ROOT / package}/" for package in PACKAGES)
+        """Dotted name -> the function by which it was entered."""
+        self._names = {path: name for name, path in sources().items()}
         self._loading: Counter[int] = Counter()
 
     def __enter__(self) -> Walk:
@@ -50,14 +48,18 @@ class Walk:
         code = frame.f_code
         if code.co_name == "_find_and_load" and "importlib" in code.co_filename:
             self._loading[threading.get_ident()] += 1 if event == "call" else -1
-        elif event == "call" and code.co_flags & _OF_FUNCTIONS and code.co_filename.startswith(self._homes):
+        elif event == "call" and code.co_flags & _OF_FUNCTIONS and code.co_filename in self._names:
             if not self._loading[threading.get_ident()]:
-                self.files.setdefault(code.co_filename.removeprefix(f"{ROOT}/"), code.co_name)
+                self.files.setdefault(self._names[code.co_filename], code.co_name)
 
 
 def stretches(files: Iterable[str]) -> list[tuple[str, list[str]]]:
     """(room, the files that are entered there before it is left), in order."""
-    return [(room, list(own)) for room, own in groupby(files, lambda file: str(Path(file).parent))]
+    return [(room, list(own)) for room, own in groupby(files, _room)]
+
+
+def _room(module: str) -> str:
+    return module.rpartition(".")[0]
 
 
 def returns(files: Iterable[str]) -> Counter[str]:
@@ -78,8 +80,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         code = cli.main(words[words[:1] == ["palpate"] :])
     back = returns(walk.files)
     for room, own in stretches(walk.files):
-        print(f"{room}/  " + "  ".join(f"{Path(file).name}:{walk.files[file]}" for file in own))
-    print(f"{len(walk.files)} files in {len(set(map(str, (Path(f).parent for f in walk.files))))} rooms")
+        print(f"{room}  " + "  ".join(f"{file.rpartition('.')[2]}:{walk.files[file]}" for file in own))
+    print(f"{len(walk.files)} files in {len(set(map(_room, walk.files)))} rooms")
     print(f"{back.total()} returns; more than twice: ", end="")
     print(", ".join(f"{room} {count}" for room, count in back.most_common() if count > 2) or "none")
     return {"files": list(walk.files), "returns": dict(back), "exit_code": code}

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.varied.draws import Draw
-from mechanics.recording.recording import Recording
-from scenes.laboratory.effects import Readings, effect
-from scenes.laboratory.frame import quaternions
-from scenes.laboratory.hand import band_noise
+from palpate.mechanics.recording.recording import Recording
+from palpate.scenes.laboratory.effects import Readings, effect
+from palpate.scenes.laboratory.frame import quaternions
+from palpate.scenes.laboratory.hand import band_noise
 
 
 def weighed(readings: Readings, draw: Draw) -> Readings:

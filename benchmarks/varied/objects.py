@@ -12,14 +12,14 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.varied.shapes import shape
-from mechanics.progress import Progress, silent
-from mechanics.shape.nearest import first_hits
-from scenes.laboratory.curves import Solving
-from scenes.laboratory.paths import touch_forces
-from scenes.laboratory.presses import Touch, sites
-from scenes.laboratory.solver import LabError
-from scenes.laboratory.specimen import Specimen
-from scenes.phantoms import Phantom
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.nearest import first_hits
+from palpate.scenes.laboratory.curves import Solving
+from palpate.scenes.laboratory.paths import touch_forces
+from palpate.scenes.laboratory.presses import Touch, sites
+from palpate.scenes.laboratory.solver import LabError
+from palpate.scenes.laboratory.specimen import Specimen
+from palpate.scenes.phantoms import Phantom
 
 POOL = 20
 """Objects in the pool: one of every family, its size by chance."""

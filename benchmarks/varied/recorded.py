@@ -12,14 +12,14 @@ from benchmarks.varied.draws import Draw
 from benchmarks.varied.instrument import logged, weighed
 from benchmarks.varied.objects import Thing, thing
 from benchmarks.varied.writing import object_name, write
-from mechanics.recording.recording import Recording, read_recording
-from mechanics.recording.segments import Segment
-from scenes.laboratory.curves import ALONE, Solving
-from scenes.laboratory.hand import HandOptions, cohort_hand
-from scenes.laboratory.motion import Motion
-from scenes.laboratory.presses import Touch
-from scenes.laboratory.session import SimulateOptions, Staging
-from scenes.laboratory.simulate import Simulation, simulate
+from palpate.mechanics.recording.recording import Recording, read_recording
+from palpate.mechanics.recording.segments import Segment
+from palpate.scenes.laboratory.curves import ALONE, Solving
+from palpate.scenes.laboratory.hand import HandOptions, cohort_hand
+from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.session import SimulateOptions, Staging
+from palpate.scenes.laboratory.simulate import Simulation, simulate
 
 LEAST_DEPTH_MM = 1.0
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from scenes.phantoms import SPACING_M, Phantom, circle, column, cushion, rectangle, resampled, stacked
+from palpate.scenes.phantoms import SPACING_M, Phantom, circle, column, cushion, rectangle, resampled, stacked
 
 Built = tuple[str, np.ndarray, np.ndarray]
 """(one line in words and metres, vertices (n, 3) m, faces (m, 3))."""

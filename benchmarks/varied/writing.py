@@ -8,9 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.varied.draws import Draw
-from mechanics.disk.toml_text import dump_toml
-from mechanics.disk.writing import atomic_file
-from mechanics.recording.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS, Recording, description_table
+from palpate.mechanics.disk.toml_text import dump_toml
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.recording.recording import (
+    QUATERNION_COLUMNS,
+    REQUIRED_COLUMNS,
+    Recording,
+    description_table,
+)
 
 SCRIPTS = (
     ("silicone sample", "recorded in the morning", "temperature"),

@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mechanics.errors import DeviceError
-from mechanics.tip_state import IDENTITY_QUATERNION
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.tip_state import IDENTITY_QUATERNION
 
 BASIS = "XYZ"
 GRIPS = ("wireless_verse_grip", "verse_grip")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from mechanics.errors import DeviceError
+from palpate.mechanics.errors import DeviceError
 
 Kind = Literal["input", "output", "feature"]
 _MAIN: dict[int, Kind] = {8: "input", 9: "output", 11: "feature"}

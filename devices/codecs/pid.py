@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from devices.codecs.hid_descriptor import Descriptor, Field, Kind, parse
-from mechanics.errors import DeviceError
+from palpate.devices.codecs.hid_descriptor import Descriptor, Field, Kind, parse
+from palpate.mechanics.errors import DeviceError
 
 PAGE = 0x000F0000
 X, Y = 0x00010030, 0x00010031

@@ -13,30 +13,30 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.instrument_effects import InstrumentOffsets, find_instrument_offsets
-from diagnose.instrument.support_readings import rigid_of
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.evidence import Search
-from diagnose.search.fit import Fit, bounds_of
-from diagnose.search.intervals import covariance
-from diagnose.search.site_stiffness import site_stiffness_sd
-from mechanics.effects.backlash import EFFECT as PLAY
-from mechanics.effects.base import Effect
-from mechanics.effects.finite_strain import EFFECT as FINITE
-from mechanics.effects.force_bias import EFFECT as BIAS
-from mechanics.effects.force_gain import EFFECT as GAIN
-from mechanics.effects.time_delay import EFFECT as DELAY
-from mechanics.effects.tool_compliance import EFFECT as SPRING
-from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
-from mechanics.errors import OptionError
-from mechanics.model.model import Model
-from mechanics.progress import Progress, silent
-from mechanics.recording.calibration import Calibration
-from mechanics.recording.recording import Recording
-from reconstruct.presses_on_model import presses_on
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.instrument.free_air import free_air_of
+from palpate.diagnosis.instrument.instrument_effects import InstrumentOffsets, find_instrument_offsets
+from palpate.diagnosis.instrument.support_readings import rigid_of
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import Fit, bounds_of
+from palpate.diagnosis.search.intervals import covariance
+from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
+from palpate.mechanics.effects.backlash import EFFECT as PLAY
+from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.effects.finite_strain import EFFECT as FINITE
+from palpate.mechanics.effects.force_bias import EFFECT as BIAS
+from palpate.mechanics.effects.force_gain import EFFECT as GAIN
+from palpate.mechanics.effects.time_delay import EFFECT as DELAY
+from palpate.mechanics.effects.tool_compliance import EFFECT as SPRING
+from palpate.mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.recording.calibration import Calibration
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.presses_on_model import presses_on
 
 TRUSTED = ("tip", "gain")
 FITTED = (SPRING, GAIN, DELAY, PLAY)

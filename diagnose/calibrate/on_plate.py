@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import ContactError
-from mechanics.recording.calibration import Calibration
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import delayed
-from reconstruct.steps.s1_filter.low_pass import low_pass
-from reconstruct.steps.s3_contacts.contacts import Exploration
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.recording.calibration import Calibration
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import delayed
+from palpate.reconstruction.steps.s1_filter.low_pass import low_pass
+from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 
 _DELAYS_S = np.arange(-0.04, 0.0401, 0.001)
 _BRISK, _TAKES_UP, _PRESSED = 0.2, 0.3, 0.1

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.verdict.result import Diagnosis
-from mechanics.effects.base import Role
-from mechanics.effects.registry import effect
-from mechanics.model.model import Model
-from mechanics.recording.recording import Recording
-from mechanics.result import Result
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.result import Result
 
 _95 = 1.96
 _NEAR_M = 0.012

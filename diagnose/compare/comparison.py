@@ -14,17 +14,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from diagnose.compare.models import RIVALS, Fem, Prepared, predicted, prepare, rms
-from mechanics.compliance.smooth_field import SmoothField
-from mechanics.errors import ContactError
-from mechanics.model.model import Model
-from mechanics.options import option
-from mechanics.presses.table import Presses
-from mechanics.progress import Progress, part, silent
-from mechanics.recording.recording import Recording
-from mechanics.result import Result
-from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-from reconstruct.presses_on_model import presses_on
+from palpate.diagnosis.compare.models import RIVALS, Fem, Prepared, predicted, prepare, rms
+from palpate.mechanics.compliance.smooth_field import SmoothField
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.options import option
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.progress import Progress, part, silent
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.result import Result
+from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
+from palpate.reconstruction.presses_on_model import presses_on
 
 Predict = Callable[[np.ndarray, np.ndarray], tuple[dict[str, np.ndarray], Fem]]
 """(training presses, held-out presses) to each model's forces (rows of the held-out, 3), N, and the FEM."""

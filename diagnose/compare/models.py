@@ -17,20 +17,20 @@ from functools import partial
 
 import numpy as np
 
-from mechanics.compliance.pressed_places import UNIFORM, Places, places_at
-from mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
-from mechanics.compliance.smooth_field import SmoothField
-from mechanics.contact.touch import forces_at
-from mechanics.model.model import Model
-from mechanics.model.one_d_laws import LAWS as ONE_D_LAWS
-from mechanics.model.one_d_laws import RIVALS as RIVALS
-from mechanics.model.one_d_laws import Law, forces_of, spread_law
-from mechanics.presses.making import of_paths
-from mechanics.presses.repeats import sites_of
-from mechanics.presses.table import MARGIN_S, Presses
-from mechanics.progress import Progress, silent
-from reconstruct.steps.s6_one_d.one_d import columns, fit_robust, low_passed
-from reconstruct.steps.s7_modulus.modulus_field import (
+from palpate.mechanics.compliance.pressed_places import UNIFORM, Places, places_at
+from palpate.mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
+from palpate.mechanics.compliance.smooth_field import SmoothField
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.model.one_d_laws import LAWS as ONE_D_LAWS
+from palpate.mechanics.model.one_d_laws import RIVALS as RIVALS
+from palpate.mechanics.model.one_d_laws import Law, forces_of, spread_law
+from palpate.mechanics.presses.making import of_paths
+from palpate.mechanics.presses.repeats import sites_of
+from palpate.mechanics.presses.table import MARGIN_S, Presses
+from palpate.mechanics.progress import Progress, silent
+from palpate.reconstruction.steps.s6_one_d.one_d import columns, fit_robust, low_passed
+from palpate.reconstruction.steps.s7_modulus.modulus_field import (
     LAW_ERROR,
     FieldSites,
     PressModuli,
@@ -39,7 +39,7 @@ from reconstruct.steps.s7_modulus.modulus_field import (
     press_moduli,
     with_field,
 )
-from reconstruct.steps.s7_modulus.press_fit import touched_by_law
+from palpate.reconstruction.steps.s7_modulus.press_fit import touched_by_law
 
 HOMOGENEOUS = "fem-homogeneous"
 MODELS = ("fem", *RIVALS, HOMOGENEOUS)

@@ -14,16 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.explore.goals import GoalState, off_support, surface_error
-from diagnose.explore.separating import Separation
-from mechanics.contact.dent import dent_law
-from mechanics.gaussian import squared_exponential
-from mechanics.options import option
-from mechanics.shape.tetmesh import vertex_normals
-from reconstruct.shapes.points import farthest_points
-from reconstruct.steps.s2_base.boundary import Boundary
-from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s7_modulus.shape_error import CORRELATION_M
+from palpate.diagnosis.explore.goals import GoalState, off_support, surface_error
+from palpate.diagnosis.explore.separating import Separation
+from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.gaussian import squared_exponential
+from palpate.mechanics.options import option
+from palpate.mechanics.shape.tetmesh import vertex_normals
+from palpate.reconstruction.shapes.points import farthest_points
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s7_modulus.shape_error import CORRELATION_M
 
 SPACING_M = 0.008
 """Between places that are weighed."""

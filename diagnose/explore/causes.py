@@ -22,12 +22,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.explore.estimate import Estimate
-from diagnose.explore.forms import Act
-from diagnose.explore.weighing import Weighing, weigh
-from diagnose.forward.prediction import Forward
-from diagnose.options import AttributionOptions
-from mechanics.effects.registry import effect
+from palpate.diagnosis.explore.estimate import Estimate
+from palpate.diagnosis.explore.forms import Act
+from palpate.diagnosis.explore.weighing import Weighing, weigh
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.options import AttributionOptions
+from palpate.mechanics.effects.registry import effect
 
 NONE = "none"
 FALSE_ALARMS = 0.02

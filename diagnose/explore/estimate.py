@@ -13,26 +13,31 @@ from functools import cached_property
 
 import numpy as np
 
-from diagnose.explore.goals import off_support, surface_error
-from mechanics.compliance.sites import LoadPatch, TouchSites, patch_width, touch_sites, touch_solver
-from mechanics.elastic.solver import Solver
-from mechanics.presses.table import Presses
-from mechanics.progress import Clock
-from mechanics.recording.recording import Recording
-from mechanics.shape.nearest import distance
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.shapes.evidence import LEAST_TOUCHES
-from reconstruct.steps.s1_filter.low_pass import FilterOptions
-from reconstruct.steps.s1_filter.signals import filtered_of
-from reconstruct.steps.s1_filter.tool_weight import ToolWeight
-from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
-from reconstruct.steps.s3_contacts.first_touch import ContactSpans
-from reconstruct.steps.s4_surface.casting import cast
-from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
-from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface, uncertainty_at
-from reconstruct.steps.s6_one_d.one_d import OneD, fit_robust, profiles
-from reconstruct.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
-from reconstruct.steps.s7_modulus.shape_error import compliance_covariance, shape_gradients
+from palpate.diagnosis.explore.goals import off_support, surface_error
+from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, patch_width, touch_sites, touch_solver
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.progress import Clock
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.shape.nearest import distance
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.shapes.evidence import LEAST_TOUCHES
+from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions
+from palpate.reconstruction.steps.s1_filter.signals import filtered_of
+from palpate.reconstruction.steps.s1_filter.tool_weight import ToolWeight
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
+from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
+from palpate.reconstruction.steps.s4_surface.casting import cast
+from palpate.reconstruction.steps.s4_surface.surface import (
+    Surface,
+    SurfaceOptions,
+    evidence_of,
+    reconstruct_surface,
+)
+from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, mesh_surface, uncertainty_at
+from palpate.reconstruction.steps.s6_one_d.one_d import OneD, fit_robust, profiles
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
+from palpate.reconstruction.steps.s7_modulus.shape_error import compliance_covariance, shape_gradients
 
 MESH_M, SURFACE_EDGE_M = 0.016, 0.010
 """Tetrahedra of the running estimate, and of its surface."""

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from diagnose.explore.estimate import Estimate
-from diagnose.explore.goals import GoalOptions
-from diagnose.explore.state import State
-from diagnose.explore.suggestion import Suggestion
-from mechanics.result import Result
+from palpate.diagnosis.explore.estimate import Estimate
+from palpate.diagnosis.explore.goals import GoalOptions
+from palpate.diagnosis.explore.state import State
+from palpate.diagnosis.explore.suggestion import Suggestion
+from palpate.mechanics.result import Result
 
 
 @dataclass(frozen=True)

@@ -9,23 +9,30 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from diagnose.explore.candidates import TOUCH_ERROR_M, ReachOptions
-from diagnose.explore.causes import Causes, causes_of
-from diagnose.explore.estimate import LEAST_PRESSES, Estimate, updated
-from diagnose.explore.explored import Explored, Step
-from diagnose.explore.goals import GoalOptions, GoalState
-from diagnose.explore.modulus import modulus_beside
-from diagnose.explore.segments import Instrument, Segment, check_joined, join, split
-from diagnose.explore.state import State, cause_goal
-from diagnose.explore.suggestion import Situation, Suggestion, suggest
-from diagnose.explore.weighing import Weighing
-from mechanics.errors import ContactError, DiagnosisError, LoudAirError, MeshError, ModelError, SurfaceError
-from mechanics.progress import Clock
-from mechanics.quantities import USUAL_POISSON_RATIO
-from mechanics.recording.recording import Recording, write_recording
-from mechanics.shape.nearest import distance
-from reconstruct.steps.s2_base.boundary import Boundary
-from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
+from palpate.diagnosis.explore.candidates import TOUCH_ERROR_M, ReachOptions
+from palpate.diagnosis.explore.causes import Causes, causes_of
+from palpate.diagnosis.explore.estimate import LEAST_PRESSES, Estimate, updated
+from palpate.diagnosis.explore.explored import Explored, Step
+from palpate.diagnosis.explore.goals import GoalOptions, GoalState
+from palpate.diagnosis.explore.modulus import modulus_beside
+from palpate.diagnosis.explore.segments import Instrument, Segment, check_joined, join, split
+from palpate.diagnosis.explore.state import State, cause_goal
+from palpate.diagnosis.explore.suggestion import Situation, Suggestion, suggest
+from palpate.diagnosis.explore.weighing import Weighing
+from palpate.mechanics.errors import (
+    ContactError,
+    DiagnosisError,
+    LoudAirError,
+    MeshError,
+    ModelError,
+    SurfaceError,
+)
+from palpate.mechanics.progress import Clock
+from palpate.mechanics.quantities import USUAL_POISSON_RATIO
+from palpate.mechanics.recording.recording import Recording, write_recording
+from palpate.mechanics.shape.nearest import distance
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 
 Order = Callable[[np.ndarray, np.ndarray, np.ndarray, np.random.Generator], int]
 """(places (p, 3) m, touched (k, 3) m, here (3,) m, random numbers) to the number of the next place."""

@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.forward.touches import unobservable_effects
-from mechanics.compliance.far_field import energy_fields
-from mechanics.effects.base import Effect, Role
-from mechanics.effects.registry import effects
-from mechanics.effects.settings import Settings
-from mechanics.presses.table import Presses
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.forward.touches import unobservable_effects
+from palpate.mechanics.compliance.far_field import energy_fields
+from palpate.mechanics.effects.base import Effect, Role
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.presses.table import Presses
 
 Act = Callable[[Settings, Forward], None]
 """Sets one form of a cause in a prediction."""

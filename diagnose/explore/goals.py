@@ -8,10 +8,10 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import erf
 
-from mechanics.errors import OptionError
-from mechanics.options import option
-from reconstruct.shapes.evidence import LEAST_TOUCHES
-from reconstruct.steps.s4_surface.surface import Surface
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import option
+from palpate.reconstruction.shapes.evidence import LEAST_TOUCHES
+from palpate.reconstruction.steps.s4_surface.surface import Surface
 
 
 @dataclass(frozen=True)

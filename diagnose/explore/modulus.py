@@ -14,16 +14,16 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from diagnose.explore.causes import NONE, Causes
-from diagnose.explore.estimate import Estimate, modulus_of
-from diagnose.explore.weighing import Weighing
-from diagnose.forward.prediction import Forward
-from diagnose.search.descent import fit
-from diagnose.search.fit import settings_of
-from mechanics.effects.registry import effect
-from mechanics.effects.time_delay import EFFECT as DELAY
-from mechanics.presses.table import Presses
-from reconstruct.steps.s7_modulus.modulus import ModulusFit
+from palpate.diagnosis.explore.causes import NONE, Causes
+from palpate.diagnosis.explore.estimate import Estimate, modulus_of
+from palpate.diagnosis.explore.weighing import Weighing
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.search.descent import fit
+from palpate.diagnosis.search.fit import settings_of
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.effects.time_delay import EFFECT as DELAY
+from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 
 MOST = 3
 """Hypotheses that are fitted, the likeliest."""

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import RecordingError
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import STATED
-from mechanics.recording.segments import Segment as Stretch
-from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import STATED
+from palpate.mechanics.recording.segments import Segment as Stretch
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 
 AIR_S = 0.3
 """Before a first press, where a recording is cut that states no segments."""
@@ -72,7 +72,7 @@ class Instrument:
 
     def __post_init__(self) -> None:
         """Raises RecordingError for what no recording may state."""
-        from mechanics.recording.files import SCHEMA
+        from palpate.mechanics.recording.files import SCHEMA
 
         for table, name in (("tool", "tip_radius_m"), ("recording", "sample_rate_hz")):
             key, value = SCHEMA[table][name], getattr(self, name)  # type: ignore[index]
@@ -82,7 +82,7 @@ class Instrument:
 
 def check_joined(instrument: Instrument, segments: list[Segment], segment: Segment) -> None:
     """Raises RecordingError where a segment makes what no exploration can be."""
-    from mechanics.recording.sane import check_sane
+    from palpate.mechanics.recording.sane import check_sane
 
     joined = join(instrument, [*segments, segment])
     check_sane(joined.t, joined.sample_rate_hz, joined.position, joined.force_on_tool)

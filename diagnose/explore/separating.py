@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.explore.causes import Causes, likeliest
-from diagnose.explore.weighing import NUISANCE, SUPPORT_GIVES, Weighing, changed
-from diagnose.forward.planned import Plan, pressed
-from diagnose.search.whiten import Whitener
-from mechanics.effects.tool_compliance import EFFECT as TOOL_COMPLIANCE
+from palpate.diagnosis.explore.causes import Causes, likeliest
+from palpate.diagnosis.explore.weighing import NUISANCE, SUPPORT_GIVES, Weighing, changed
+from palpate.diagnosis.forward.planned import Plan, pressed
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL_COMPLIANCE
 
 PLANS = (
     Plan(0.8, 0.02, 0.2, 0.0, 1),

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.explore.causes import Causes, words
-from diagnose.explore.goals import GoalState
+from palpate.diagnosis.explore.causes import Causes, words
+from palpate.diagnosis.explore.goals import GoalState
 
 
 @dataclass(frozen=True)

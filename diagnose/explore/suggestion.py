@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.explore.candidates import Candidate, Known, ReachOptions, first_places, ranked
-from diagnose.explore.causes import Causes, words
-from diagnose.explore.estimate import LEAST_PRESSES, Estimate
-from diagnose.explore.goals import GoalOptions
-from diagnose.explore.modulus import log_sd
-from diagnose.explore.separating import RIGID_S, separations, support_gain
-from diagnose.explore.state import State
-from diagnose.explore.weighing import Weighing
-from reconstruct.steps.s2_base.boundary import Boundary
-from reconstruct.steps.s7_modulus.modulus import ModulusOptions
+from palpate.diagnosis.explore.candidates import Candidate, Known, ReachOptions, first_places, ranked
+from palpate.diagnosis.explore.causes import Causes, words
+from palpate.diagnosis.explore.estimate import LEAST_PRESSES, Estimate
+from palpate.diagnosis.explore.goals import GoalOptions
+from palpate.diagnosis.explore.modulus import log_sd
+from palpate.diagnosis.explore.separating import RIGID_S, separations, support_gain
+from palpate.diagnosis.explore.state import State
+from palpate.diagnosis.explore.weighing import Weighing
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusOptions
 
 FAR_FROM = 3.0
 """Times as much as all presses that are left are expected to show."""

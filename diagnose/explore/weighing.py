@@ -11,29 +11,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.explore.estimate import MESH_M, Estimate, solved_sites
-from diagnose.explore.forms import Act, balls, forms_of, softer
-from diagnose.forward.prediction import Forward
-from diagnose.forward.touches import reached, touches_of
-from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.instrument_effects import find_instrument_offsets
-from diagnose.instrument.support_readings import rigid_of
-from diagnose.options import NuisanceOptions
-from diagnose.search.descent import fit
-from diagnose.search.fit import Fit, settings_of
-from diagnose.search.gaps import modulus_share
-from diagnose.search.site_stiffness import site_stiffness_sd
-from diagnose.search.starts import first_touches
-from diagnose.search.whiten import Whitener
-from mechanics.compliance.pressed_places import places_at
-from mechanics.effects.base import Role
-from mechanics.effects.registry import effects
-from mechanics.effects.settings import Settings
-from mechanics.gaussian import squared_exponential
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.table import Presses
-from reconstruct.steps.s5_mesh.meshing import uncertainty_at
+from palpate.diagnosis.explore.estimate import MESH_M, Estimate, solved_sites
+from palpate.diagnosis.explore.forms import Act, balls, forms_of, softer
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.forward.touches import reached, touches_of
+from palpate.diagnosis.instrument.free_air import free_air_of
+from palpate.diagnosis.instrument.instrument_effects import find_instrument_offsets
+from palpate.diagnosis.instrument.support_readings import rigid_of
+from palpate.diagnosis.options import NuisanceOptions
+from palpate.diagnosis.search.descent import fit
+from palpate.diagnosis.search.fit import Fit, settings_of
+from palpate.diagnosis.search.gaps import modulus_share
+from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
+from palpate.diagnosis.search.starts import first_touches
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.compliance.pressed_places import places_at
+from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.gaussian import squared_exponential
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.steps.s5_mesh.meshing import uncertainty_at
 
 LEAST_PRESSES = 6
 SUPPORT_GIVES = 1.5e-5

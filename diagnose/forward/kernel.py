@@ -12,10 +12,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from mechanics.contact.dent import dent_load
-from mechanics.contact.touch import STATE_SIZE, touch_remember, touch_solve
-from mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
-from mechanics.effects.laws_along_path import sharp_laws, smooth_laws
+from palpate.mechanics.contact.dent import dent_load
+from palpate.mechanics.contact.touch import STATE_SIZE, touch_remember, touch_solve
+from palpate.mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
+from palpate.mechanics.effects.laws_along_path import sharp_laws, smooth_laws
 
 SUB_PLACES = 5
 """Of a thinned step's path, over which a sharp law is averaged."""

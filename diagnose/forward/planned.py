@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from mechanics.presses.table import Presses
-from mechanics.recording.side_of_play import sides
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.side_of_play import sides
 
 DEEPEST_M = 0.009
 CLEARANCE_M = 2e-3

@@ -13,20 +13,20 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from diagnose.forward import kernel
-from diagnose.forward.touches import place_of
-from mechanics.compliance.pressed_places import Places, solve_places
-from mechanics.contact.dent import bend_of, effective_radius
-from mechanics.contact.touch import TouchedPlaces
-from mechanics.effects.laws_along_path import new_memory, path_numbers
-from mechanics.effects.settings import Settings
-from mechanics.model.model import Model
-from mechanics.press_solver.press import LAWS
-from mechanics.press_solver.solved_places import ExactPresses, Touched, solve_touched
-from mechanics.presses.table import Presses
-from mechanics.progress import Progress, silent
-from mechanics.recording.kinematics import acceleration
-from render.surface.felt_surface import felt_surface
+from palpate.diagnosis.forward import kernel
+from palpate.diagnosis.forward.touches import place_of
+from palpate.mechanics.compliance.pressed_places import Places, solve_places
+from palpate.mechanics.contact.dent import bend_of, effective_radius
+from palpate.mechanics.contact.touch import TouchedPlaces
+from palpate.mechanics.effects.laws_along_path import new_memory, path_numbers
+from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.press_solver.press import LAWS
+from palpate.mechanics.press_solver.solved_places import ExactPresses, Touched, solve_touched
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.recording.kinematics import acceleration
+from palpate.render.surface.felt_surface import felt_surface
 
 KEPT = 8
 """Integrated touches that are kept."""

@@ -7,11 +7,11 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.effects.base import Role, Scope
-from mechanics.effects.registry import effects
-from mechanics.errors import DiagnosisError
-from mechanics.presses.table import LEAD_S, STEP_S, Presses
-from mechanics.recording.side_of_play import sides
+from palpate.mechanics.effects.base import Role, Scope
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.errors import DiagnosisError
+from palpate.mechanics.presses.table import LEAD_S, STEP_S, Presses
+from palpate.mechanics.recording.side_of_play import sides
 
 REACH_M = 2.4e-3
 """Most by which a first touch is moved."""

@@ -9,11 +9,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from diagnose.instrument.jackknife import all_but_one, covariance
-from mechanics.presses.table import Presses
-from mechanics.recording.kinematics import acceleration
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import runs
+from palpate.diagnosis.instrument.jackknife import all_but_one, covariance
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.kinematics import acceleration
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import runs
 
 BLOCK_S = 0.25
 MIN_BLOCKS = 8

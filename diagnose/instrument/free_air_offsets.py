@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from diagnose.forward.prediction import Forward
-from diagnose.forward.touches import FOLLOWED
-from diagnose.instrument.free_air import FreeAir, matrices
-from diagnose.options import AttributionOptions
-from mechanics.effects.force_bias import EFFECT as BIAS
-from mechanics.effects.force_drift import EFFECT as DRIFT
-from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
-from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.forward.touches import FOLLOWED
+from palpate.diagnosis.instrument.free_air import FreeAir, matrices
+from palpate.diagnosis.options import AttributionOptions
+from palpate.mechanics.effects.force_bias import EFFECT as BIAS
+from palpate.mechanics.effects.force_drift import EFFECT as DRIFT
+from palpate.mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
+from palpate.mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
 
 @dataclass(frozen=True)

@@ -10,17 +10,17 @@ import dataclasses
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.instrument.free_air import FreeAir
-from diagnose.instrument.free_air_offsets import InstrumentOffsets, around, free_air_offsets, matters
-from diagnose.instrument.retraced import Move
-from diagnose.instrument.support_readings import Rigid
-from diagnose.options import AttributionOptions
-from mechanics.effects.backlash import EFFECT as PLAY
-from mechanics.effects.base import Effect
-from mechanics.effects.force_gain import EFFECT as GAIN
-from mechanics.effects.surface_offset import EFFECT as OFFSET
-from mechanics.effects.tool_compliance import EFFECT as SPRING
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.instrument.free_air import FreeAir
+from palpate.diagnosis.instrument.free_air_offsets import InstrumentOffsets, around, free_air_offsets, matters
+from palpate.diagnosis.instrument.retraced import Move
+from palpate.diagnosis.instrument.support_readings import Rigid
+from palpate.diagnosis.options import AttributionOptions
+from palpate.mechanics.effects.backlash import EFFECT as PLAY
+from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.effects.force_gain import EFFECT as GAIN
+from palpate.mechanics.effects.surface_offset import EFFECT as OFFSET
+from palpate.mechanics.effects.tool_compliance import EFFECT as SPRING
 
 RULES = AttributionOptions()
 LEAST_PLAY_M = 5e-5

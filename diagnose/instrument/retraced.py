@@ -12,11 +12,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from diagnose.instrument.jackknife import all_but_one, covariance
-from diagnose.instrument.support_readings import KINDS, on_support
-from mechanics.frames import tangents
-from mechanics.presses.table import Presses
-from mechanics.recording.recording import Recording
+from palpate.diagnosis.instrument.jackknife import all_but_one, covariance
+from palpate.diagnosis.instrument.support_readings import KINDS, on_support
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.recording import Recording
 
 GROUPS = 10
 """Stretches of either tracing that are left out in turn for standard errors."""

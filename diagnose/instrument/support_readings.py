@@ -18,12 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.instrument.jackknife import all_but_one, covariance
-from mechanics.frames import tangents
-from mechanics.presses.table import Presses
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import runs
-from mechanics.recording.side_of_play import leads
+from palpate.diagnosis.instrument.jackknife import all_but_one, covariance
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import runs
+from palpate.mechanics.recording.side_of_play import leads
 
 KINDS = ("trace", "rigid", "retrace")
 BLOCK_S = 0.05

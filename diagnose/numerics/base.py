@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.effects.base import Effect
-from mechanics.presses.table import Presses
+from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.presses.table import Presses
 
 DOMAIN = "numerics"
 LEAST_SHARE = 0.1

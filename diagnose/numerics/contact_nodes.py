@@ -7,12 +7,12 @@ by nodes alone is met late, between them, by a share of a0^2 / R.
 
 import numpy as np
 
-from diagnose.numerics.base import DOMAIN, NumericalEffect
-from mechanics.contact.dent import grid
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Parameter, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings
+from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.mechanics.contact.dent import grid
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Parameter, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
 
 _JOIN = 3.0
 """How sharply punch and sphere meet."""

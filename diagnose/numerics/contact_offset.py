@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from diagnose.numerics.base import DOMAIN, NumericalEffect
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Parameter, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings
+from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Parameter, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

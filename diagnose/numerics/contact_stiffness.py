@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.numerics.base import DOMAIN, NumericalEffect
-from mechanics.contact.dent import grid
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Parameter, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.mechanics.contact.dent import grid
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Parameter, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
 
 
 def layer_factors(share: float) -> tuple[np.ndarray, np.ndarray]:

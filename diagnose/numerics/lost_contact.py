@@ -6,9 +6,9 @@ import dataclasses
 import numpy as np
 from scipy.ndimage import grey_closing
 
-from diagnose.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, Seen, Signal
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Parameter, Role, Scope, no_keys
+from palpate.diagnosis.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, Seen, Signal
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Parameter, Role, Scope, no_keys
 
 LONGEST_S = 0.05
 """Of a gap that counts as flicker; longer ones are contact that was lost for good (`tunnelling`)."""

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.numerics.base import DOMAIN, NumericalEffect
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Parameter, Scope
-from mechanics.effects.settings import WEIGHED, Scene, Settings
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Parameter, Scope
+from palpate.mechanics.effects.settings import WEIGHED, Scene, Settings
 
 
 def _velocity(scene: Forward) -> np.ndarray:

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from diagnose.numerics.base import DOMAIN, NumericalEffect
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Parameter, Scope
-from mechanics.effects.settings import Scene, Settings
+from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Parameter, Scope
+from palpate.mechanics.effects.settings import Scene, Settings
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

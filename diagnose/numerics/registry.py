@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import importlib
 
-from diagnose.numerics.base import NumericalEffect
-from mechanics.errors import OptionError
+from palpate.diagnosis.numerics.base import NumericalEffect
+from palpate.mechanics.errors import OptionError
 
 NAMES = (
     "contact_stiffness",
@@ -24,7 +24,7 @@ def numerical(name: str) -> NumericalEffect:
     """The effect of that name; raises OptionError for an unknown one."""
     if name not in NAMES:
         raise OptionError(f"'{name}' is no numerical effect; allowed are {', '.join(NAMES)}")
-    return importlib.import_module(f"diagnose.numerics.{name}").EFFECT
+    return importlib.import_module(f"palpate.diagnosis.numerics.{name}").EFFECT
 
 
 def numericals() -> tuple[NumericalEffect, ...]:

@@ -10,11 +10,11 @@ import dataclasses
 
 import numpy as np
 
-from diagnose.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, Seen, Signal
-from diagnose.numerics.lost_contact import LONGEST_S
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Parameter, Role, Scope, no_keys
-from mechanics.recording.segments import runs
+from palpate.diagnosis.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, Seen, Signal
+from palpate.diagnosis.numerics.lost_contact import LONGEST_S
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Parameter, Role, Scope, no_keys
+from palpate.mechanics.recording.segments import runs
 
 INSIDE = 0.5
 """Of a press's greatest depth, beyond which a tip without force is inside without being felt."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from diagnose.numerics.registry import numerical
-from diagnose.other_simulator.against_law import Numerics
-from diagnose.other_simulator.parts import Parameter
+from palpate.diagnosis.numerics.registry import numerical
+from palpate.diagnosis.other_simulator.against_law import Numerics
+from palpate.diagnosis.other_simulator.parts import Parameter
 
 _MEANT = {
     "stated_modulus": ("Young's modulus", "Pa"),

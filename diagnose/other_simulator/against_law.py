@@ -13,22 +13,22 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.numerics.base import NumericalEffect, Signal
-from diagnose.numerics.registry import numericals
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.other_simulator.stated import StatedForward
-from diagnose.search.attribution import Attribution, attribute
-from diagnose.search.descent import Descent
-from diagnose.search.detectable import SEEN
-from diagnose.search.evidence import Search
-from diagnose.search.fit import Fit, settings_of
-from diagnose.search.intervals import parameter_intervals
-from diagnose.verdict.held_out import ITERATIONS, neighbours, never_worse
-from mechanics.effects.base import Effect, Role
-from mechanics.effects.registry import effects
-from mechanics.presses.table import Noise
-from mechanics.progress import Progress, silent
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.numerics.base import NumericalEffect, Signal
+from palpate.diagnosis.numerics.registry import numericals
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.other_simulator.stated import StatedForward
+from palpate.diagnosis.search.attribution import Attribution, attribute
+from palpate.diagnosis.search.descent import Descent
+from palpate.diagnosis.search.detectable import SEEN
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import Fit, settings_of
+from palpate.diagnosis.search.intervals import parameter_intervals
+from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours, never_worse
+from palpate.mechanics.effects.base import Effect, Role
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.presses.table import Noise
+from palpate.mechanics.progress import Progress, silent
 
 LEAST_SHARE = 0.02
 """Of the typical force, below which a numerical effect is not named: our own law is no better everywhere."""

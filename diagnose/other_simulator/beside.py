@@ -6,17 +6,17 @@ import dataclasses
 
 import numpy as np
 
-from diagnose.forward.touches import LEAST_PRESSES, LEAST_ROWS, reached, touches_of
-from diagnose.numerics.base import signal_of
-from diagnose.options import AttributionOptions
-from diagnose.other_simulator.against_law import LEAST_SHARE, Numerics, numerics_of, seen_in_samples
-from diagnose.other_simulator.forces import Aligned
-from diagnose.other_simulator.parts import law_at
-from diagnose.other_simulator.stated import Stated, StatedForward
-from diagnose.verdict.answer import Findings
-from mechanics.model.model import Model
-from mechanics.presses.table import MARGIN_S, Presses
-from mechanics.progress import Progress
+from palpate.diagnosis.forward.touches import LEAST_PRESSES, LEAST_ROWS, reached, touches_of
+from palpate.diagnosis.numerics.base import signal_of
+from palpate.diagnosis.options import AttributionOptions
+from palpate.diagnosis.other_simulator.against_law import LEAST_SHARE, Numerics, numerics_of, seen_in_samples
+from palpate.diagnosis.other_simulator.forces import Aligned
+from palpate.diagnosis.other_simulator.parts import law_at
+from palpate.diagnosis.other_simulator.stated import Stated, StatedForward
+from palpate.diagnosis.verdict.answer import Findings
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.presses.table import MARGIN_S, Presses
+from palpate.mechanics.progress import Progress
 
 
 @dataclasses.dataclass

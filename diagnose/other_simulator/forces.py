@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.disk.reading import reading
-from mechanics.errors import OptionError, RecordingError
-from mechanics.options import option
-from mechanics.presses.table import LEAD_S, Presses
+from palpate.mechanics.disk.reading import reading
+from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.options import option
+from palpate.mechanics.presses.table import LEAD_S, Presses
 
 COLUMNS = ("t", "fx", "fy", "fz")
 LONGEST_GAP_S = 0.03

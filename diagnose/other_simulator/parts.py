@@ -20,20 +20,20 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.numerics.registry import numerical
-from diagnose.options import AttributionOptions
-from diagnose.other_simulator.against_law import COMMON_ERROR, Numerics
-from diagnose.other_simulator.stated import Stated, StatedForward
-from diagnose.search.descent import Descent
-from diagnose.search.evidence import Search
-from diagnose.search.fit import Fit, settings_of
-from diagnose.search.gaps import lower_closure
-from diagnose.verdict.answer import Findings
-from diagnose.verdict.held_out import ITERATIONS, neighbours
-from mechanics.effects.base import Effect
-from mechanics.effects.friction_slip import EFFECT as SLIP
-from mechanics.effects.poisson_ratio import EFFECT as POISSON
-from mechanics.effects.tip_radius import EFFECT as TIP
+from palpate.diagnosis.numerics.registry import numerical
+from palpate.diagnosis.options import AttributionOptions
+from palpate.diagnosis.other_simulator.against_law import COMMON_ERROR, Numerics
+from palpate.diagnosis.other_simulator.stated import Stated, StatedForward
+from palpate.diagnosis.search.descent import Descent
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import Fit, settings_of
+from palpate.diagnosis.search.gaps import lower_closure
+from palpate.diagnosis.verdict.answer import Findings
+from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours
+from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
+from palpate.mechanics.effects.poisson_ratio import EFFECT as POISSON
+from palpate.mechanics.effects.tip_radius import EFFECT as TIP
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.numerics.registry import NAMES, numerical
-from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
-from diagnose.other_simulator.advice import advice_of
-from diagnose.other_simulator.against_law import Numerics
-from diagnose.other_simulator.beside import Sides, beside, named_numerics
-from diagnose.other_simulator.forces import Forces, ForcesOptions, aligned
-from diagnose.other_simulator.parts import (
+from palpate.diagnosis.numerics.registry import NAMES, numerical
+from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from palpate.diagnosis.other_simulator.advice import advice_of
+from palpate.diagnosis.other_simulator.against_law import Numerics
+from palpate.diagnosis.other_simulator.beside import Sides, beside, named_numerics
+from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions, aligned
+from palpate.diagnosis.other_simulator.parts import (
     PARAMETER_OF,
     Parameter,
     Reality,
@@ -26,19 +26,19 @@ from diagnose.other_simulator.parts import (
     reality_of,
     wrong_parameters,
 )
-from diagnose.other_simulator.result import Part, SimulatedGap, Simulator
-from diagnose.other_simulator.sizes import sizes_alone
-from diagnose.other_simulator.stated import Stated
-from diagnose.pipeline import diagnose, with_tip_of
-from diagnose.search.gaps import closed_share_ci95
-from diagnose.verdict.answer import Answer, Findings
-from diagnose.verdict.result import Diagnosis, EffectEntry
-from diagnose.verdict.where import locate
-from mechanics.errors import DiagnosisError
-from mechanics.model.model import Model
-from mechanics.progress import Progress, part, silent
-from mechanics.recording.recording import Recording
-from reconstruct.presses_on_model import presses_on
+from palpate.diagnosis.other_simulator.result import Part, SimulatedGap, Simulator
+from palpate.diagnosis.other_simulator.sizes import sizes_alone
+from palpate.diagnosis.other_simulator.stated import Stated
+from palpate.diagnosis.pipeline import diagnose, with_tip_of
+from palpate.diagnosis.search.gaps import closed_share_ci95
+from palpate.diagnosis.verdict.answer import Answer, Findings
+from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
+from palpate.diagnosis.verdict.where import locate
+from palpate.mechanics.errors import DiagnosisError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.progress import Progress, part, silent
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.presses_on_model import presses_on
 
 OWN_MODULUS = "stated_modulus"
 

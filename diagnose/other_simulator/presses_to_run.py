@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.forward.touches import LEAST_PRESSES
-from mechanics.presses.table import LEAD_S, Presses
+from palpate.diagnosis.forward.touches import LEAST_PRESSES
+from palpate.mechanics.presses.table import LEAD_S, Presses
 
 
 def spread_out(presses: Presses, most: int | None) -> np.ndarray:

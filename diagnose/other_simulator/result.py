@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.other_simulator.stated import Stated
-from diagnose.verdict.result import Diagnosis, EffectEntry, answers_json
-from diagnose.verdict.where import Where
-from mechanics.presses.table import Presses
-from mechanics.result import Result
+from palpate.diagnosis.other_simulator.stated import Stated
+from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry, answers_json
+from palpate.diagnosis.verdict.where import Where
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.result import Result
 
 PARTS = ("numerics", "parameters", "reality")
 """In the order in which they are taken off."""

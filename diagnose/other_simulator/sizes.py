@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagnose.other_simulator.against_law import Numerics
-from diagnose.other_simulator.parts import PARAMETER_OF, Weighing, law_at
-from diagnose.other_simulator.stated import Stated, StatedForward
+from palpate.diagnosis.other_simulator.against_law import Numerics
+from palpate.diagnosis.other_simulator.parts import PARAMETER_OF, Weighing, law_at
+from palpate.diagnosis.other_simulator.stated import Stated, StatedForward
 
 
 def sizes_alone(

@@ -8,16 +8,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from diagnose.forward.prediction import Forward
-from mechanics.compliance.far_field import far_at_poisson
-from mechanics.disk.schema import Key
-from mechanics.effects.friction_slip import EFFECT as SLIP
-from mechanics.effects.settings import STICKS, Settings
-from mechanics.effects.tip_radius import EFFECT as TIP
-from mechanics.errors import OptionError
-from mechanics.key_values import number, pairs
-from mechanics.model.model import Model
-from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.mechanics.compliance.far_field import far_at_poisson
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
+from palpate.mechanics.effects.settings import STICKS, Settings
+from palpate.mechanics.effects.tip_radius import EFFECT as TIP
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.key_values import number, pairs
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 
 _FRICTION = Key(low=0.0, high=100.0, unknown=True)
 KEYS: dict[str, Key] = {

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.search.evidence import Search
-from diagnose.search.fewer import fewer
-from diagnose.search.leave_one_out import Candidate
-from diagnose.search.naming import Score
-from diagnose.search.rivals import confidence_set_p, of_one_phenomenon, rivals_of
-from mechanics.effects.base import Effect, Scope
-from mechanics.progress import Progress, silent
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fewer import fewer
+from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.rivals import confidence_set_p, of_one_phenomenon, rivals_of
+from palpate.mechanics.effects.base import Effect, Scope
+from palpate.mechanics.progress import Progress, silent
 
 SHOWN, MOST_SHOWN = 10.0, 4
 """Gain in log likelihood from which an effect on a simulator's force is there, if not alone; of how many such

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.search.fit import Fit, bounds_of, settings_of
-from diagnose.search.whiten import Whitener
-from mechanics.effects.base import Effect
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.search.fit import Fit, bounds_of, settings_of
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.effects.base import Effect
 
 SHIFTS_M = (-1.2e-3, -6e-4, -3e-4, -1.5e-4, -7e-5, 7e-5, 1.5e-4, 3e-4, 6e-4, 1.2e-3)
 """Of a site's first touches, tried together once a descent has come to rest."""

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnose.search.evidence import Search
-from diagnose.search.fit import settings_of
-from diagnose.search.gaps import modulus_share
-from diagnose.search.leave_one_out import Candidate
-from diagnose.search.whiten import Whitener
-from mechanics.effects.base import Effect
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import settings_of
+from palpate.diagnosis.search.gaps import modulus_share
+from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.effects.base import Effect
 
 SEEN = 4.7
 """Standard deviations: 3.1 for 2 % false alarms among twenty effects, 1.6 more to be seen 19 times of 20."""

@@ -8,16 +8,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.descent import Descent, fit
-from diagnose.search.fit import Fit, settings_of
-from diagnose.search.gaps import closed_share, lower_closure
-from diagnose.search.leave_one_out import Candidate, held_out
-from diagnose.search.naming import Score
-from diagnose.search.starts import first_touches
-from diagnose.search.whiten import Whitener
-from mechanics.effects.base import Effect
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.descent import Descent, fit
+from palpate.diagnosis.search.fit import Fit, settings_of
+from palpate.diagnosis.search.gaps import closed_share, lower_closure
+from palpate.diagnosis.search.leave_one_out import Candidate, held_out
+from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.starts import first_touches
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.effects.base import Effect
 
 
 class Search:

@@ -14,11 +14,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from diagnose.search.evidence import Search
-from diagnose.search.leave_one_out import Candidate
-from diagnose.search.naming import Score
-from diagnose.search.rivals import of_one_phenomenon
-from mechanics.effects.base import Effect, Scope
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.rivals import of_one_phenomenon
+from palpate.mechanics.effects.base import Effect, Scope
 
 TRIED = 3
 """So many others are tried, those that gain most by themselves."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from mechanics.effects.base import Effect
-from mechanics.effects.settings import Settings
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.effects.settings import Settings
 
 MODULUS_STEP = 0.01
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.search.fit import Fit
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.search.fit import Fit
 
 DRAWS = 200
 

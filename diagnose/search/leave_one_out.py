@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.search.descent import Descent
-from diagnose.search.fit import Fit
+from palpate.diagnosis.search.descent import Descent
+from palpate.diagnosis.search.fit import Fit
 
 DAMPINGS = (1e-9, 1e-3, 1e-2, 0.1, 1.0)
 """Of a step, as shares of the curvature, the least first: where two branches of one time are thrown by the

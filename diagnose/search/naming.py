@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from scipy.special import expit
 
-from diagnose.search.leave_one_out import Candidate
-from mechanics.effects.base import Effect
+from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.mechanics.effects.base import Effect
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnose.search.evidence import Search
-from diagnose.search.leave_one_out import Candidate
-from diagnose.search.naming import Score
-from mechanics.effects.base import Effect
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.naming import Score
+from palpate.mechanics.effects.base import Effect
 
 ALIKE = 0.92
 """Cosine of the angle between two effects' residual patterns from which they are called confusable."""

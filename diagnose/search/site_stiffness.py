@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from diagnose.forward.prediction import Forward
-from diagnose.options import NuisanceOptions
-from diagnose.search.fit import Fit
-from mechanics.presses.table import Presses
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.options import NuisanceOptions
+from palpate.diagnosis.search.fit import Fit
+from palpate.mechanics.presses.table import Presses
 
 SHARE_PER_HEIGHT = 2.5
 """Relative stiffness error a unit of surface error over the object's height (edges near a press count

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.forward.touches import REACH_M
-from diagnose.search.fit import Fit, settings_of
-from diagnose.search.whiten import Whitener
-from mechanics.effects.hints import Misfit
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.forward.touches import REACH_M
+from palpate.diagnosis.search.fit import Fit, settings_of
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.effects.hints import Misfit
 
 LEAST_SD = 0.015
 """Share by which a press's stiffness is off at least, beside noise and shape."""

@@ -18,11 +18,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import cho_factor, solve_triangular
 
-from diagnose.forward.prediction import Forward
-from diagnose.forward.touches import FOLLOWED
-from diagnose.options import NuisanceOptions
-from mechanics.effects.settings import Settings
-from mechanics.presses.table import Presses
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.forward.touches import FOLLOWED
+from palpate.diagnosis.options import NuisanceOptions
+from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.presses.table import Presses
 
 _FEW_COLUMNS = 3
 _MODES = 2

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import trapezoid
 
-from diagnose.specimen.bench import HAND_TIP_M, Bench
-from mechanics.contact.dent import dent_law
-from reconstruct.steps.s1_filter.low_pass import white_noise_std
+from palpate.diagnosis.specimen.bench import HAND_TIP_M, Bench
+from palpate.mechanics.contact.dent import dent_law
+from palpate.reconstruction.steps.s1_filter.low_pass import white_noise_std
 
 APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")
 _BLOCKS = 8

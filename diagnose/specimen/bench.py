@@ -16,17 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.contact.dent import dent_law
-from mechanics.errors import ContactError
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.cutting import FoundAround, FoundPresses, cut
-from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M, parse_unit, unit_of_key
-from mechanics.recording.recording import Recording
-from mechanics.robust import spread_about_zero
-from reconstruct.geometry.slab import flat_mesh, half_space_size
-from reconstruct.steps.s1_filter.low_pass import white_noise_std
-from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
+from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
+from palpate.mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M, parse_unit, unit_of_key
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.robust import spread_about_zero
+from palpate.reconstruction.geometry.slab import flat_mesh, half_space_size
+from palpate.reconstruction.steps.s1_filter.low_pass import white_noise_std
+from palpate.reconstruction.steps.s3_contacts.contact_law import Loading, first_touches
 
 HAND_TIP_M, PEAK_N = USUAL_TIP_RADIUS_M, 1.0
 """The size to which curves are brought: tip's radius, and the force of the middle one at its peak."""

@@ -7,16 +7,16 @@ import dataclasses
 import numpy as np
 from scipy.stats import t as student
 
-from diagnose.forward.touches import LEAST_PRESSES
-from diagnose.options import DiagnoseOptions, NuisanceOptions
-from diagnose.pipeline import diagnose
-from diagnose.search.descent import Descent
-from diagnose.search.fit import settings_of
-from diagnose.search.whiten import Whitener
-from diagnose.specimen.bench import PEAK_N, Bench
-from diagnose.verdict.result import Diagnosis
-from mechanics.presses.table import HOLDING
-from mechanics.progress import Progress, silent
+from palpate.diagnosis.forward.touches import LEAST_PRESSES
+from palpate.diagnosis.options import DiagnoseOptions, NuisanceOptions
+from palpate.diagnosis.pipeline import diagnose
+from palpate.diagnosis.search.descent import Descent
+from palpate.diagnosis.search.fit import settings_of
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.diagnosis.specimen.bench import PEAK_N, Bench
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.presses.table import HOLDING
+from palpate.mechanics.progress import Progress, silent
 
 _FLOOR = {False: 0.005, True: 0.02}
 """Share of the peak by which the law may miss what no name covers: of one piece, of different ones."""

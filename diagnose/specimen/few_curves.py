@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import t as student
 
-from diagnose.specimen.approach import APPROACH_LAWS, Approach
-from diagnose.specimen.bench import Bench
-from diagnose.specimen.result import MachineTests, Material
-from diagnose.specimen.seen import seen_of_few
-from diagnose.specimen.yielding import Machine, Way, machine_of, own_moduli, rigid_interval, way_of
-from mechanics.effects.tool_compliance import EFFECT as TOOL
+from palpate.diagnosis.specimen.approach import APPROACH_LAWS, Approach
+from palpate.diagnosis.specimen.bench import Bench
+from palpate.diagnosis.specimen.result import MachineTests, Material
+from palpate.diagnosis.specimen.seen import seen_of_few
+from palpate.diagnosis.specimen.yielding import Machine, Way, machine_of, own_moduli, rigid_interval, way_of
+from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL
 
 _WIDE = 0.1
 """Share of the work that may stay away in a solid whose modulus is one number."""

@@ -10,25 +10,32 @@ from typing import Any
 import numpy as np
 from scipy.stats import t as student
 
-from diagnose.forward.touches import touches_of
-from diagnose.specimen.approach import approach_of
-from diagnose.specimen.bench import Bench, Curve, bench_of
-from diagnose.specimen.bench_diagnosis import diagnose_bench, modulus_interval, unseen_holds
-from diagnose.specimen.few_curves import INDENTATION_UNKNOWN, material_of_few
-from diagnose.specimen.result import MachineTests, Material
-from diagnose.specimen.rivals import held_out_rivals
-from diagnose.specimen.seen import seen_of_all
-from diagnose.specimen.zero import bias, late_contact
-from diagnose.verdict.result import Diagnosis
-from mechanics.effects.finite_strain import EFFECT as FINITE
-from mechanics.effects.registry import effects
-from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
-from mechanics.effects.viscoelasticity import EFFECT as PRONY
-from mechanics.errors import OptionError
-from mechanics.progress import Progress, silent
-from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO, quantity_words
-from reconstruct.machine_curves.relaxation import held_out_relaxation
-from reconstruct.machine_curves.uniaxial import CEILING, LAWS, MOST_STRAIN, chosen, fit_law, held_out
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.specimen.approach import approach_of
+from palpate.diagnosis.specimen.bench import Bench, Curve, bench_of
+from palpate.diagnosis.specimen.bench_diagnosis import diagnose_bench, modulus_interval, unseen_holds
+from palpate.diagnosis.specimen.few_curves import INDENTATION_UNKNOWN, material_of_few
+from palpate.diagnosis.specimen.result import MachineTests, Material
+from palpate.diagnosis.specimen.rivals import held_out_rivals
+from palpate.diagnosis.specimen.seen import seen_of_all
+from palpate.diagnosis.specimen.zero import bias, late_contact
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.effects.finite_strain import EFFECT as FINITE
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.effects.strain_stiffening import EFFECT as STIFFENING
+from palpate.mechanics.effects.viscoelasticity import EFFECT as PRONY
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO, quantity_words
+from palpate.reconstruction.machine_curves.relaxation import held_out_relaxation
+from palpate.reconstruction.machine_curves.uniaxial import (
+    CEILING,
+    LAWS,
+    MOST_STRAIN,
+    chosen,
+    fit_law,
+    held_out,
+)
 
 UNIAXIAL_UNKNOWN = (
     "friction at the faces",

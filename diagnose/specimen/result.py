@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.specimen.bench import Curve
-from diagnose.verdict.result import Diagnosis
-from mechanics.result import Result
-from reconstruct.machine_curves.uniaxial import Uniaxial
-from reconstruct.steps.s7_modulus.held_out import BETTER
+from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.result import Result
+from palpate.reconstruction.machine_curves.uniaxial import Uniaxial
+from palpate.reconstruction.steps.s7_modulus.held_out import BETTER
 
 FLOORS = {
     "relaxation": ("spring",),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.presses.table import Presses
+from palpate.mechanics.presses.table import Presses
 
 FOLDS = 8
 _EXPONENTS = np.linspace(0.5, 3.0, 26)

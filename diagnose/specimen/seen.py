@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.search.fit import settings_of
-from diagnose.specimen.approach import Approach
-from diagnose.specimen.bench import HAND_TIP_M, Bench
-from diagnose.specimen.yielding import Machine
-from diagnose.verdict.result import Diagnosis
-from mechanics.contact.dent import dent_law
+from palpate.diagnosis.search.fit import settings_of
+from palpate.diagnosis.specimen.approach import Approach
+from palpate.diagnosis.specimen.bench import HAND_TIP_M, Bench
+from palpate.diagnosis.specimen.yielding import Machine
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.contact.dent import dent_law
 
 Seen = tuple[np.ndarray, np.ndarray, np.ndarray, str, str]
 """Depth m, force N measured, force N of the fit, and the axes' words."""

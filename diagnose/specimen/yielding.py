@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 
-from mechanics.contact.dent import dent_law
+from palpate.mechanics.contact.dent import dent_law
 
 LAWS = ("sphere", "hertz", "linear", "neo-hookean")
 _BETTER, _ALIKE = 0.93, 1.1

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnose.specimen.bench import Bench, Curve
-from diagnose.specimen.yielding import Way, left_out_error
-from mechanics.contact.dent import dent_law
-from reconstruct.steps.s1_filter.low_pass import white_noise_std
+from palpate.diagnosis.specimen.bench import Bench, Curve
+from palpate.diagnosis.specimen.yielding import Way, left_out_error
+from palpate.mechanics.contact.dent import dent_law
+from palpate.reconstruction.steps.s1_filter.low_pass import white_noise_std
 
 _PUSHES, _OFF = 0.03, 0.01
 """Share of the peak that first rows push by where a contact may be late; that a bias must have to be said."""

@@ -6,16 +6,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnose.forward.prediction import Forward
-from diagnose.instrument.free_air import FreeAir
-from diagnose.instrument.instrument_effects import InstrumentOffsets
-from diagnose.search.attribution import Attribution
-from diagnose.search.evidence import Search
-from diagnose.search.fit import Fit, settings_of
-from diagnose.search.gaps import modulus_share
-from diagnose.search.site_stiffness import heterogeneity, site_factors
-from mechanics.effects.base import Role
-from mechanics.effects.registry import effect, effects
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.instrument.free_air import FreeAir
+from palpate.diagnosis.instrument.instrument_effects import InstrumentOffsets
+from palpate.diagnosis.search.attribution import Attribution
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import Fit, settings_of
+from palpate.diagnosis.search.gaps import modulus_share
+from palpate.diagnosis.search.site_stiffness import heterogeneity, site_factors
+from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.registry import effect, effects
 
 # Share of the force by which full three-dimensional solves leave small-strain elasticity, against depth over
 # tip radius: fitted to labelled recordings, 1.4 % (rms) at 3-4 mm and 6 % at 4-8 mm with a tip of 5 mm.

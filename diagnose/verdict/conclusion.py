@@ -7,19 +7,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from diagnose.search.detectable import detectable
-from diagnose.search.gaps import closed_share, closed_share_ci95, gap
-from diagnose.search.intervals import parameter_intervals
-from diagnose.search.rivals import alike
-from diagnose.search.site_stiffness import repeat_scatter
-from diagnose.verdict.answer import Answer, Findings, answer_of, stated_gap
-from diagnose.verdict.corrections import how_named, sureness, widened
-from diagnose.verdict.held_out import Gaps, held_out_gaps, without_what_makes_it_worse
-from diagnose.verdict.next_touch import proposed
-from diagnose.verdict.result import Diagnosis, EffectEntry
-from diagnose.verdict.where import locate
-from mechanics.effects.base import Role
-from mechanics.effects.registry import effect
+from palpate.diagnosis.search.detectable import detectable
+from palpate.diagnosis.search.gaps import closed_share, closed_share_ci95, gap
+from palpate.diagnosis.search.intervals import parameter_intervals
+from palpate.diagnosis.search.rivals import alike
+from palpate.diagnosis.search.site_stiffness import repeat_scatter
+from palpate.diagnosis.verdict.answer import Answer, Findings, answer_of, stated_gap
+from palpate.diagnosis.verdict.corrections import how_named, sureness, widened
+from palpate.diagnosis.verdict.held_out import Gaps, held_out_gaps, without_what_makes_it_worse
+from palpate.diagnosis.verdict.next_touch import proposed
+from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
+from palpate.diagnosis.verdict.where import locate
+from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.registry import effect
 
 CERTAIN_GAIN = 1e3
 """Log likelihood that stands for what was read off free air or the support."""

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.schema import Key
-from mechanics.effects.registry import effect
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.registry import effect
 
 SURENESS_FILE = Path(__file__).with_name("sureness.toml")
 WIDENING_FILE = Path(__file__).with_name("widening.toml")

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.instrument.free_air_offsets import InstrumentOffsets
-from diagnose.search.descent import Descent
-from diagnose.search.evidence import Search
-from diagnose.search.fit import Fit
-from diagnose.search.gaps import gap, resampled
-from diagnose.search.leave_one_out import Candidate
-from diagnose.search.whiten import Whitener
-from diagnose.verdict.answer import Answer, Findings
-from mechanics.presses.table import Presses
+from palpate.diagnosis.instrument.free_air_offsets import InstrumentOffsets
+from palpate.diagnosis.search.descent import Descent
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import Fit
+from palpate.diagnosis.search.gaps import gap, resampled
+from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.diagnosis.verdict.answer import Answer, Findings
+from palpate.mechanics.presses.table import Presses
 
 FOLDS = 6
 ITERATIONS = 6

@@ -13,17 +13,17 @@ import itertools
 
 import numpy as np
 
-from diagnose.forward.planned import DEEPEST_M, Plan, pressed
-from diagnose.forward.prediction import Forward
-from diagnose.options import NuisanceOptions
-from diagnose.search.attribution import Attribution
-from diagnose.search.evidence import Search
-from diagnose.search.fit import settings_of
-from diagnose.search.leave_one_out import Candidate
-from diagnose.search.naming import Score
-from diagnose.search.whiten import Whitener
-from diagnose.verdict.result import NextTouch
-from mechanics.effects.settings import Settings
+from palpate.diagnosis.forward.planned import DEEPEST_M, Plan, pressed
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.options import NuisanceOptions
+from palpate.diagnosis.search.attribution import Attribution
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import settings_of
+from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.diagnosis.verdict.result import NextTouch
+from palpate.mechanics.effects.settings import Settings
 
 DEPTHS = (0.35, 0.8, 1.2)
 SPEEDS = (0.004, 0.02, 0.08)

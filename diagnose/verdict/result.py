@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from diagnose import apply
-from diagnose.forward.prediction import Forward
-from diagnose.instrument.free_air import FreeAir
-from diagnose.search.attribution import Attribution
-from diagnose.verdict.where import Where
-from mechanics.model.model import Model
-from mechanics.press_solver.solved_places import ExactPresses
-from mechanics.recording.recording import Recording
-from mechanics.result import Result
+from palpate.diagnosis import apply
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.instrument.free_air import FreeAir
+from palpate.diagnosis.search.attribution import Attribution
+from palpate.diagnosis.verdict.where import Where
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.press_solver.solved_places import ExactPresses
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.result import Result
 
 _SENTENCES = {
     "none": "the gap is noise; no effect is missing",

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from diagnose.forward.prediction import Forward
-from diagnose.instrument.free_air import FreeAir
-from mechanics.presses.gap_bins import gap_by_bin
-from mechanics.presses.table import HOLDING, LOADING, UNLOADING, Presses
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.instrument.free_air import FreeAir
+from palpate.mechanics.presses.gap_bins import gap_by_bin
+from palpate.mechanics.presses.table import HOLDING, LOADING, UNLOADING, Presses
 
 AXES = ("depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air")
 FLIPS = 2000

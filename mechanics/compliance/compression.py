@@ -15,11 +15,11 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numba import njit
 
-from mechanics.compliance.patch import PatchSampler
-from mechanics.elastic.solver import Solver
-from mechanics.errors import MeshError
-from mechanics.kernels import kernel
-from mechanics.progress import Progress, silent
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.kernels import kernel
+from palpate.mechanics.progress import Progress, silent
 
 _AT_ONCE = 32  # patches that are solved for together
 _STEP = 120  # load patterns before the first look at the error; then a third more each time

@@ -14,13 +14,13 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.compliance.patch import PatchSampler, half_space_compliance
-from mechanics.compliance.pressed_places import UNIFORM, Places
-from mechanics.compliance.sites import PATCH_WIDTH_IN_EDGES, typical_edge
-from mechanics.contact.edges import base_bracing, braced_share
-from mechanics.elastic.elasticity import element_stiffness
-from mechanics.elastic.solver import Solver
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance
+from palpate.mechanics.compliance.pressed_places import UNIFORM, Places
+from palpate.mechanics.compliance.sites import PATCH_WIDTH_IN_EDGES, typical_edge
+from palpate.mechanics.contact.edges import base_bracing, braced_share
+from palpate.mechanics.elastic.elasticity import element_stiffness
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 _CHUNK, _BATCH = 600, 24
 _SIX = np.triu_indices(3)

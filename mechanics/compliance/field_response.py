@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.compliance.far_field import EnergyFields, energy_fields, far_with_weights
-from mechanics.compliance.pressed_places import Places
-from mechanics.compliance.smooth_field import TIP_DEPTH_IN_RADII, Shares
+from palpate.mechanics.compliance.far_field import EnergyFields, energy_fields, far_with_weights
+from palpate.mechanics.compliance.pressed_places import Places
+from palpate.mechanics.compliance.smooth_field import TIP_DEPTH_IN_RADII, Shares
 
 
 def shares_of(places: Places, answer: np.ndarray) -> Shares:

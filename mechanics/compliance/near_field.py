@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.compliance.compression import own_compliance
-from mechanics.compliance.patch import PatchSampler
-from mechanics.elastic.solver import Solver
-from mechanics.progress import Progress, silent
-from mechanics.quantities import USUAL_TIP_RADIUS_M
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.compression import own_compliance
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 CONTACT_IN_TIP_RADII = 0.44
 """Width of the Gaussian that stands for a contact 0.8 tip radii deep: by it a nodule is felt as in a contact

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from mechanics.errors import MeshError
-from mechanics.shape.nearest import triangle_areas
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.shape.nearest import triangle_areas
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 REACH = 4.0  # patch widths beyond which the Gaussian (3e-4) is left out
 PATCH_WIDTH_M, PATCH_SHARE = 0.004, 1 / 30

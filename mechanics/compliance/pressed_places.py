@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.near_field import contact_width
-from mechanics.compliance.patch import PatchSampler
-from mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
-from mechanics.disk.store import content_key, load_or_build
-from mechanics.model.model import Model
-from mechanics.presses.table import Presses
+from palpate.mechanics.compliance.near_field import contact_width
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
+from palpate.mechanics.disk.store import content_key, load_or_build
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.presses.table import Presses
 
 VERSION = 7
 UNIFORM = "uniform solver"

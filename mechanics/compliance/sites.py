@@ -8,21 +8,21 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.compliance.compression import own_blocks
-from mechanics.compliance.near_field import contact_width, sharpening
-from mechanics.compliance.patch import half_space_compliance, usual_width
-from mechanics.contact.depth_factors import DepthFactors
-from mechanics.contact.edges import edge_law
-from mechanics.elastic.held_base import BaseHold
-from mechanics.elastic.solver import Solver
-from mechanics.errors import MeshError
-from mechanics.frames import local_frames
-from mechanics.model.material import Ball
-from mechanics.model.moduli import with_balls
-from mechanics.progress import Progress, silent
-from mechanics.quantities import USUAL_TIP_RADIUS_M
-from mechanics.shape.refine import refined_around, refined_near_surface, typical_edge
-from mechanics.shape.tetmesh import TetMesh, vertex_normals
+from palpate.mechanics.compliance.compression import own_blocks
+from palpate.mechanics.compliance.near_field import contact_width, sharpening
+from palpate.mechanics.compliance.patch import half_space_compliance, usual_width
+from palpate.mechanics.contact.depth_factors import DepthFactors
+from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.elastic.held_base import BaseHold
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.frames import local_frames
+from palpate.mechanics.model.material import Ball
+from palpate.mechanics.model.moduli import with_balls
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
+from palpate.mechanics.shape.refine import refined_around, refined_near_surface, typical_edge
+from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 
 PATCH_WIDTH_IN_EDGES = 0.8
 SURFACE_EDGE_M = 0.006

@@ -20,13 +20,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from mechanics.compliance.patch import PatchSampler, half_space_compliance
-from mechanics.compliance.pressed_places import Places
-from mechanics.compliance.sites import SURFACE_EDGE_M, patch_loads, patch_width
-from mechanics.elastic.elasticity import element_stiffness
-from mechanics.elastic.solver import Solver
-from mechanics.shape.refine import refined_near_surface
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance
+from palpate.mechanics.compliance.pressed_places import Places
+from palpate.mechanics.compliance.sites import SURFACE_EDGE_M, patch_loads, patch_width
+from palpate.mechanics.elastic.elasticity import element_stiffness
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.shape.refine import refined_near_surface
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 APART = 0.015
 """Share of a place's compliance along its normal by which its bounds may lie apart. Half way the error is at

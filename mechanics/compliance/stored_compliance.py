@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
-from mechanics.disk.store import content_key, load_or_build
-from mechanics.effects.hold import base_hold
-from mechanics.elastic.held_base import BaseHold
-from mechanics.errors import OptionError
-from mechanics.model.model import Model
-from mechanics.options import option
-from mechanics.progress import Progress, silent
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
+from palpate.mechanics.disk.store import content_key, load_or_build
+from palpate.mechanics.effects.hold import base_hold
+from palpate.mechanics.elastic.held_base import BaseHold
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.options import option
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 FORMS = ("auto", "dense", "low-rank")
 

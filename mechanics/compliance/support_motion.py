@@ -16,13 +16,13 @@ import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve, solve, solve_triangular
 from scipy.spatial import Delaunay
 
-from mechanics.compliance.far_field import energy_fields
-from mechanics.compliance.pressed_places import Places
-from mechanics.elastic.elasticity import stiffness, triangle_mass
-from mechanics.elastic.floor import resting
-from mechanics.elastic.held_base import base_triangles
-from mechanics.frames import local_frames
-from mechanics.shape.tetmesh import EDGES, TetMesh
+from palpate.mechanics.compliance.far_field import energy_fields
+from palpate.mechanics.compliance.pressed_places import Places
+from palpate.mechanics.elastic.elasticity import stiffness, triangle_mass
+from palpate.mechanics.elastic.floor import resting
+from palpate.mechanics.elastic.held_base import base_triangles
+from palpate.mechanics.frames import local_frames
+from palpate.mechanics.shape.tetmesh import EDGES, TetMesh
 
 ANGLES = 8
 FREE_FRACTIONS = (0.25, 0.5, 0.75)

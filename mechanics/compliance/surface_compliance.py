@@ -15,26 +15,26 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 import scipy.sparse as sp
 
-from mechanics.compliance.compression import compress, own_blocks, unit_loads
-from mechanics.compliance.near_field import sharpening
-from mechanics.compliance.patch import PatchSampler, half_space_compliance, triangle_shapes
-from mechanics.compliance.sites import (
+from palpate.mechanics.compliance.compression import compress, own_blocks, unit_loads
+from palpate.mechanics.compliance.near_field import sharpening
+from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance, triangle_shapes
+from palpate.mechanics.compliance.sites import (
     SURFACE_EDGE_M,
     load_width,
     patch_width,
     shape_under_one_patch,
     touch_solver,
 )
-from mechanics.elastic.floor import carried_by_floor
-from mechanics.elastic.held_base import BaseHold
-from mechanics.elastic.solver import Solver
-from mechanics.model.material import Ball
-from mechanics.model.moduli import with_balls
-from mechanics.progress import Progress, silent
-from mechanics.quantities import USUAL_TIP_RADIUS_M
-from mechanics.shape.nearest import closest
-from mechanics.shape.refine import typical_edge
-from mechanics.shape.tetmesh import TetMesh, vertex_normals
+from palpate.mechanics.elastic.floor import carried_by_floor
+from palpate.mechanics.elastic.held_base import BaseHold
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.model.material import Ball
+from palpate.mechanics.model.moduli import with_balls
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
+from palpate.mechanics.shape.nearest import closest
+from palpate.mechanics.shape.refine import typical_edge
+from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 
 WIDE_PATCH_M = 0.008  # of the mutual compliance of a large surface, whatever its elements
 _CORNERS = 32  # patches solved at once

@@ -17,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.compliance.patch import usual_width
-from mechanics.quantities import USUAL_POISSON_RATIO
-from mechanics.shape.nearest import distance, triangle_areas
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.patch import usual_width
+from palpate.mechanics.quantities import USUAL_POISSON_RATIO
+from palpate.mechanics.shape.nearest import distance, triangle_areas
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 TURN_POWER = 3
 """Power of a rim's turn, over a right angle, with which it counts: solved for 60 and 90 degrees."""

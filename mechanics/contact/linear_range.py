@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.contact.touch import forces_at
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.contact.touch import forces_at
 
 DEEPEST_IN_RADII = 2.5
 _STEPS = 250

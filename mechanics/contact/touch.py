@@ -22,11 +22,11 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.contact.dent import DentLaw, bend_of, dent_force, dent_law, effective_radius
-from mechanics.contact.depth_factors import DepthFactors
-from mechanics.frames import local_frames
-from mechanics.kernels import kernel
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.contact.dent import DentLaw, bend_of, dent_force, dent_law, effective_radius
+from palpate.mechanics.contact.depth_factors import DepthFactors
+from palpate.mechanics.frames import local_frames
+from palpate.mechanics.kernels import kernel
 
 _STIFFEST = 0.8  # of a contact's own compliance, the most that a near support may take away
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged

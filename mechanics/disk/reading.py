@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from mechanics.disk.scratch import cache_folder
-from mechanics.errors import FileError, PalpateError
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.errors import FileError, PalpateError
 
 FOLLOW_PATHS = "PALPATE_FOLLOW_PATHS"
 """Set to 1: paths in a TOML may leave its folder."""

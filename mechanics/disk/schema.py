@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mechanics import names
-from mechanics.errors import PalpateError
+from palpate.mechanics import names
+from palpate.mechanics.errors import PalpateError
 
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 _SHOWN = 60

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.writing import atomic_file
-from mechanics.errors import CacheError
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.errors import CacheError
 
 _MAGIC = b"PALPATE2"
 _ALIGN, _START, _DIGEST = 64, 16, 32

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.disk.reading import bounded_memory, no_file
-from mechanics.disk.vtk_files import read_vtk
-from mechanics.errors import SurfaceError
-from mechanics.quantities import parse_unit
+from palpate.mechanics.disk.reading import bounded_memory, no_file
+from palpate.mechanics.disk.vtk_files import read_vtk
+from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.quantities import parse_unit
 
 if TYPE_CHECKING:
     import trimesh

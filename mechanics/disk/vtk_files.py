@@ -12,8 +12,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from mechanics.disk.reading import reading
-from mechanics.errors import PalpateError
+from palpate.mechanics.disk.reading import reading
+from palpate.mechanics.errors import PalpateError
 
 
 def vtk_bytes(dataset: Any) -> bytes:

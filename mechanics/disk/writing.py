@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 
-from mechanics.disk.reading import refusal
-from mechanics.disk.scratch import OLD, sweep, sweep_scratch, temporary_prefix
-from mechanics.errors import FileError, PalpateError
+from palpate.mechanics.disk.reading import refusal
+from palpate.mechanics.disk.scratch import OLD, sweep, sweep_scratch, temporary_prefix
+from palpate.mechanics.errors import FileError, PalpateError
 
 _HEAD_BYTES = 1 << 16
 _WHOLE_BYTES = 1 << 26

@@ -7,11 +7,11 @@ not taken off a recording: the tip's side of the play is not known in free air.
 
 import numpy as np
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Parameter, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings
-from mechanics.recording.side_of_play import play
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Parameter, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.recording.side_of_play import play
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

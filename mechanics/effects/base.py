@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.schema import ANY, Schema
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.law import Law
-from mechanics.effects.settings import Scene, Settings, Touch
-from mechanics.errors import ModelError
-from mechanics.model.model import Model
-from mechanics.recording.recording import Recording
+from palpate.mechanics.disk.schema import ANY, Schema
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.errors import ModelError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import Recording
 
 DOMAINS = ("object", "contact", "boundary", "instrument")
 Keys = Mapping[str, Any]

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.support_motion import far_on_springs
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.compliance.support_motion import far_on_springs
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
 
 _FELT = 1.5e-3  # share of the object's height that counts as no compliance
 

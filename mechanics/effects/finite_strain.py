@@ -3,9 +3,9 @@ depth."""
 
 import numpy as np
 
-from mechanics.effects.base import Effect, Keys, Role, Scope, no_keys
-from mechanics.effects.settings import Scene, Settings, Touch
-from mechanics.model.model import Model
+from palpate.mechanics.effects.base import Effect, Keys, Role, Scope, no_keys
+from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.model.model import Model
 
 LAW = "neo-hookean"
 

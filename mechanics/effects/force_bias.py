@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
-from mechanics.effects.settings import SHIFTED, Scene, Settings
-from mechanics.recording.calibration import Calibration
-from mechanics.recording.recording import Recording
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
+from palpate.mechanics.effects.settings import SHIFTED, Scene, Settings
+from palpate.mechanics.recording.calibration import Calibration
+from palpate.mechanics.recording.recording import Recording
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

@@ -4,10 +4,10 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
-from mechanics.effects.settings import SHIFTED, Scene, Settings
-from mechanics.recording.recording import Recording
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
+from palpate.mechanics.effects.settings import SHIFTED, Scene, Settings
+from palpate.mechanics.recording.recording import Recording
 
 
 def drifted(t: np.ndarray, rate_n_per_s: np.ndarray) -> np.ndarray:

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from mechanics.disk.schema import ANY
-from mechanics.effects.base import Effect, Keys, Parameter, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import MIXED, Scene, Settings
-from mechanics.recording.calibration import Calibration
-from mechanics.recording.recording import Recording
+from palpate.mechanics.disk.schema import ANY
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import MIXED, Scene, Settings
+from palpate.mechanics.recording.calibration import Calibration
+from palpate.mechanics.recording.recording import Recording
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

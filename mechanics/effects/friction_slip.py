@@ -6,12 +6,12 @@ it, a secant step on what is too much; renderer and prediction take the same wal
 
 from __future__ import annotations
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Touch
-from mechanics.kernels import kernel
-from mechanics.model.model import Model
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.kernels import kernel
+from palpate.mechanics.model.model import Model
 
 SLIPS = 12
 CAUTION, SECANT_CAUTION = 0.9, 0.98

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.effects.settings import Scene
+from palpate.mechanics.effects.settings import Scene
 
 
 @dataclass(frozen=True)

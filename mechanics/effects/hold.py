@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.effects.registry import effects as known_effects
-from mechanics.elastic.held_base import BaseHold
+from palpate.mechanics.effects.registry import effects as known_effects
+from palpate.mechanics.elastic.held_base import BaseHold
 
 
 def base_hold(

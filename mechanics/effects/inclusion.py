@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.compliance.far_field import energy_fields
-from mechanics.compliance.pressed_places import Places
-from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.contact.edges import edge_law
-from mechanics.effects.base import Effect, Keys, Parameter, Scope
-from mechanics.effects.hints import Misfit, SearchHints
-from mechanics.effects.settings import Scene, Settings
-from mechanics.model.material import BALL, Ball
-from mechanics.model.model import Model
-from mechanics.shape.nearest import closest
+from palpate.mechanics.compliance.far_field import energy_fields
+from palpate.mechanics.compliance.pressed_places import Places
+from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.hints import Misfit, SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.model.material import BALL, Ball
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.shape.nearest import closest
 
 RATIO_LIMITS = (0.15, 20.0)
 GRID_M = 0.007

@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.law import Law
-from mechanics.effects.settings import Scene, Settings, Touch
-from mechanics.kernels import kernel
-from mechanics.model.model import Model
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.kernels import kernel
+from palpate.mechanics.model.model import Model
 
 _HALVINGS = 60
 _OBJECT_GIVES = 4.0

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mechanics.effects.law import Law
-from mechanics.effects.registry import effects
-from mechanics.effects.settings import Touch
-from mechanics.kernels import fresh_part
+from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.kernels import fresh_part
 
 LAWS: tuple[Law, ...] = tuple(sorted((e.law for e in effects() if e.law is not None), key=lambda x: x.order))
 """In the order in which they follow one another."""

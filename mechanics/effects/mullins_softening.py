@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-from mechanics.contact.dent import dent_load
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
-from mechanics.effects.law import Law
-from mechanics.effects.settings import Touch
-from mechanics.kernels import kernel
-from mechanics.model.model import Model
+from palpate.mechanics.contact.dent import dent_load
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.kernels import kernel
+from palpate.mechanics.model.model import Model
 
 _NONE = 1e-6  # 1 / r that counts as none
 

@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.compliance.far_field import bracing_at_poisson, far_at_poisson
-from mechanics.effects.base import Effect, Keys, Parameter, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings
-from mechanics.model.model import Model
-from mechanics.quantities import POISSON_RATIO
+from palpate.mechanics.compliance.far_field import bracing_at_poisson, far_at_poisson
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.quantities import POISSON_RATIO
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

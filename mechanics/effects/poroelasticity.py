@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.law import Law
-from mechanics.effects.settings import Scene, Touch
-from mechanics.effects.viscoelasticity import changed, let_go, recall
-from mechanics.kernels import kernel
-from mechanics.model.model import Model
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.settings import Scene, Touch
+from palpate.mechanics.effects.viscoelasticity import changed, let_go, recall
+from palpate.mechanics.kernels import kernel
+from palpate.mechanics.model.model import Model
 
 WEIGHTS = (0.1802, 0.7058, 0.0876, 0.0264)
 RATES = (0.1943, 1.5966, 15.9847, 567.6116)

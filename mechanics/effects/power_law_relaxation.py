@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Touch
-from mechanics.effects.viscoelasticity import add_terms
-from mechanics.model.model import Model
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Touch
+from palpate.mechanics.effects.viscoelasticity import add_terms
+from palpate.mechanics.model.model import Model
 
 SHORTEST_S, LONGEST_S = 0.005, 100.0
 TAU_S = np.append(np.geomspace(0.5 * SHORTEST_S, LONGEST_S, 7), 1e3 * LONGEST_S)

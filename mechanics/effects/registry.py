@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import importlib
 
-from mechanics.disk.schema import Schema
-from mechanics.effects.base import Effect
-from mechanics.errors import OptionError
-from mechanics.names import unknown
+from palpate.mechanics.disk.schema import Schema
+from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.names import unknown
 
 NAMES = (
     "finite_strain",
@@ -48,7 +48,7 @@ def known(name: str) -> None:
 def effect(name: str) -> Effect:
     """The effect of that name; raises OptionError for an unknown one."""
     known(name)
-    return importlib.import_module(f"mechanics.effects.{name}").EFFECT
+    return importlib.import_module(f"palpate.mechanics.effects.{name}").EFFECT
 
 
 def effects(*, without: frozenset[str] | set[str] = frozenset()) -> tuple[Effect, ...]:

@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from mechanics.compliance.pressed_places import Places
-from mechanics.contact.dent import DentLaw, dent_law
-from mechanics.effects.law import Law
+from palpate.mechanics.compliance.pressed_places import Places
+from palpate.mechanics.contact.dent import DentLaw, dent_law
+from palpate.mechanics.effects.law import Law
 
 STICKS = float("inf")
 

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.far_field import energy_fields, far_with_weights
-from mechanics.contact.dent import grid
-from mechanics.effects.base import Effect, Keys, Parameter, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings, Touch
-from mechanics.model.material import SKIN, Skin
-from mechanics.model.model import Model
+from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
+from palpate.mechanics.contact.dent import grid
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.model.material import SKIN, Skin
+from palpate.mechanics.model.model import Model
 
 
 def film_weight(thickness_over_contact: np.ndarray, poisson_ratio: float) -> np.ndarray:

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.far_field import energy_fields
-from mechanics.compliance.field_response import far_of, shares_in_elements, tips_of
-from mechanics.compliance.pressed_places import Places
-from mechanics.compliance.smooth_field import (
+from palpate.mechanics.compliance.far_field import energy_fields
+from palpate.mechanics.compliance.field_response import far_of, shares_in_elements, tips_of
+from palpate.mechanics.compliance.pressed_places import Places
+from palpate.mechanics.compliance.smooth_field import (
     Prior,
     SmoothField,
     correlation,
@@ -26,12 +26,12 @@ from mechanics.compliance.smooth_field import (
     places_of,
     views_of,
 )
-from mechanics.disk.schema import ANY, Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope
-from mechanics.effects.hints import Misfit, SearchHints
-from mechanics.effects.settings import Scene, Settings
-from mechanics.model.material import LENGTH
-from mechanics.model.model import Model
+from palpate.mechanics.disk.schema import ANY, Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.hints import Misfit, SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.model.material import LENGTH
+from palpate.mechanics.model.model import Model
 
 MODES = 10
 _USUAL = Prior(0.35, 0.02, 0.03)

@@ -18,12 +18,12 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from mechanics.contact.dent import grid
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Touch
-from mechanics.model.model import Model
+from palpate.mechanics.contact.dent import grid
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.model.model import Model
 
 FAMILY = Path(__file__).parents[1] / "contact" / "dent_stiffening.csv"
 """Columns ratio, depth / R, ln of the factor on the force over ratio, the same of the sideways stiffness."""

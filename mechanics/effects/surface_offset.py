@@ -5,10 +5,10 @@ The model's surface is wrong then, and this says where it was, not what it shoul
 
 import numpy as np
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Parameter, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Parameter, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

@@ -6,8 +6,8 @@ by more than their shape's uncertainty and nothing else explains how. What the s
 say, so it is not rendered.
 """
 
-from mechanics.disk.schema import ANY, Key
-from mechanics.effects.base import Effect, Role, Scope, no_keys
+from palpate.mechanics.disk.schema import ANY, Key
+from palpate.mechanics.effects.base import Effect, Role, Scope, no_keys
 
 EFFECT = Effect(
     name="surface_shape",

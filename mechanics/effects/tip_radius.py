@@ -1,10 +1,10 @@
 """Tip radius: the sphere is not as large as stated; the dent's force goes with its square root."""
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Touch
-from mechanics.model.model import Model
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.model.model import Model
 
 
 def _touch(touch: Touch, keys: Keys, model: Model) -> None:

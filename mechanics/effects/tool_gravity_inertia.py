@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import WEIGHED, Scene, Settings
-from mechanics.recording.kinematics import acceleration
-from mechanics.recording.recording import Recording
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import WEIGHED, Scene, Settings
+from palpate.mechanics.recording.kinematics import acceleration
+from palpate.mechanics.recording.recording import Recording
 
 STANDARD_GRAVITY = 9.80665
 

@@ -4,12 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.compliance.support_motion import ANGLES, far_partly_bonded
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.settings import Scene, Settings
-from mechanics.frames import tangents
+from palpate.mechanics.compliance.support_motion import ANGLES, far_partly_bonded
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.frames import tangents
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

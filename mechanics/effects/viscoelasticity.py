@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.schema import Key
-from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
-from mechanics.effects.hints import SearchHints
-from mechanics.effects.law import Law
-from mechanics.effects.settings import Scene, Settings, Touch
-from mechanics.errors import ModelError
-from mechanics.kernels import kernel
-from mechanics.model.model import Model
-from mechanics.quantities import quantity_words
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from palpate.mechanics.effects.hints import SearchHints
+from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.errors import ModelError
+from palpate.mechanics.kernels import kernel
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.quantities import quantity_words
 
 
 @kernel

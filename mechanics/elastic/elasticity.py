@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from mechanics.errors import MeshError
-from mechanics.shape.nearest import triangle_areas
-from mechanics.shape.tetmesh import EDGES, TetMesh
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.shape.nearest import triangle_areas
+from palpate.mechanics.shape.tetmesh import EDGES, TetMesh
 
 # four points of degree 2 (Stroud): exact for products of the quadratic element's linear gradients
 _A, _B = (5 + 3 * np.sqrt(5)) / 20, (5 - np.sqrt(5)) / 20

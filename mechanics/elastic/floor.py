@@ -11,9 +11,9 @@ import numpy as np
 from scipy.linalg import solve
 from scipy.spatial import cKDTree
 
-from mechanics.compliance.patch import PatchSampler
-from mechanics.elastic.held_base import base_triangles
-from mechanics.elastic.solver import Solver
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.elastic.held_base import base_triangles
+from palpate.mechanics.elastic.solver import Solver
 
 _ROUNDS = 12
 _COLUMNS = 96

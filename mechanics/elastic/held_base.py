@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from mechanics.elastic.elasticity import triangle_mass
-from mechanics.errors import OptionError
-from mechanics.shape.nearest import triangle_areas
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.elastic.elasticity import triangle_mass
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.shape.nearest import triangle_areas
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 FLOOR = 1e5  # 1/m, stiffness a unit of area over the modulus: far stiffer than an object of centimetres
 

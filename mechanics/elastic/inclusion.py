@@ -14,10 +14,10 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from mechanics.elastic.elasticity import element_stiffness
-from mechanics.elastic.solver import Solver
-from mechanics.errors import MeshError
-from mechanics.progress import Progress, silent
+from palpate.mechanics.elastic.elasticity import element_stiffness
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.progress import Progress, silent
 
 _COLUMNS = 96
 _NEGLIGIBLE = 1e-6  # singular values of X over the greatest one

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from mechanics.elastic import pardiso
+from palpate.mechanics.elastic import pardiso
 
 
 class SuperLuFactor:

@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from mechanics.elastic import pardiso
-from mechanics.elastic.elasticity import LOCAL_BULK, stiffness
-from mechanics.elastic.held_base import BaseHold
-from mechanics.errors import MeshError, OptionError
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.elastic import pardiso
+from palpate.mechanics.elastic.elasticity import LOCAL_BULK, stiffness
+from palpate.mechanics.elastic.held_base import BaseHold
+from palpate.mechanics.errors import MeshError, OptionError
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 BACKENDS = ("pardiso", "superlu")
 

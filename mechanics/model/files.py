@@ -21,16 +21,16 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.contact.dent import dent_laws
-from mechanics.disk.reading import read_toml
-from mechanics.disk.schema import ANY, Key, Named, Schema, check_table
-from mechanics.disk.store import read_arrays, write_arrays
-from mechanics.disk.toml_text import dump_toml
-from mechanics.disk.vtk_files import read_vtk, vtk_bytes
-from mechanics.disk.writing import FolderKind, Kind, atomic_file, atomic_folder
-from mechanics.effects.registry import effect_keys
-from mechanics.errors import CacheError, MeshError, ModelError
-from mechanics.model.material import (
+from palpate.mechanics.contact.dent import dent_laws
+from palpate.mechanics.disk.reading import read_toml
+from palpate.mechanics.disk.schema import ANY, Key, Named, Schema, check_table
+from palpate.mechanics.disk.store import read_arrays, write_arrays
+from palpate.mechanics.disk.toml_text import dump_toml
+from palpate.mechanics.disk.vtk_files import read_vtk, vtk_bytes
+from palpate.mechanics.disk.writing import FolderKind, Kind, atomic_file, atomic_folder
+from palpate.mechanics.effects.registry import effect_keys
+from palpate.mechanics.errors import CacheError, MeshError, ModelError
+from palpate.mechanics.model.material import (
     BALL,
     GRADIENT,
     PLACE,
@@ -40,12 +40,12 @@ from mechanics.model.material import (
     Material,
     Skin,
 )
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.table import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
-from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
-from mechanics.recording.segments import KINDS, Segment
-from mechanics.shape.tetmesh import TetMesh
-from mechanics.shape.true_shape import TrueShape
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.table import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
+from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.mechanics.recording.segments import KINDS, Segment
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.true_shape import TrueShape
 
 FORMAT = 3
 """Of model.toml; no other is read. [end] is its last table: a file without it was cut off."""

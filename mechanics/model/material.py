@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.contact.dent import dent_laws
-from mechanics.disk.schema import Key, Schema
-from mechanics.errors import ModelError
-from mechanics.quantities import POISSON_RATIO
+from palpate.mechanics.contact.dent import dent_laws
+from palpate.mechanics.disk.schema import Key, Schema
+from palpate.mechanics.errors import ModelError
+from palpate.mechanics.quantities import POISSON_RATIO
 
 UNKNOWN = (float("nan"), float("nan"))
 """An interval that nobody estimated."""

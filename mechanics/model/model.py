@@ -11,19 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import ModelError
-from mechanics.model.material import (
+from palpate.mechanics.errors import ModelError
+from palpate.mechanics.model.material import (
     UNKNOWN,
     Material,
     finite,
     positive,
 )
-from mechanics.model.moduli import gradient_ratio, height_share, skin_ratio, with_balls, within_limits
-from mechanics.presses.making import no_presses
-from mechanics.presses.table import Presses
-from mechanics.quantities import USUAL_TIP_RADIUS_M
-from mechanics.result import Result
-from mechanics.shape.tetmesh import TetMesh, vertex_normals
+from palpate.mechanics.model.moduli import gradient_ratio, height_share, skin_ratio, with_balls, within_limits
+from palpate.mechanics.presses.making import no_presses
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
+from palpate.mechanics.result import Result
+from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 
 
 @dataclass(frozen=True, eq=False)

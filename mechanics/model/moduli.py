@@ -9,9 +9,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from mechanics.model.material import Ball, Gradient, Skin
-from mechanics.shape.nearest import distance
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.model.material import Ball, Gradient, Skin
+from palpate.mechanics.shape.nearest import distance
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 MODULUS_LIMITS = (0.05, 50.0)
 """Of an element over the global modulus: what is harder still feels the same."""

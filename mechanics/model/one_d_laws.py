@@ -15,8 +15,8 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
-from mechanics.errors import ModelError
-from mechanics.presses.table import Presses
+from palpate.mechanics.errors import ModelError
+from palpate.mechanics.presses.table import Presses
 
 RIVALS = ("kelvin-voigt", "hunt-crossley")
 """Those that a finite-element model is held against."""

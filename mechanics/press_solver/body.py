@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.elastic.partial_factor import partial_factor
-from mechanics.press_solver.condensing import Assembly
-from mechanics.press_solver.graded_mesh import GradedMesh
-from mechanics.press_solver.solid import Response, Solid
+from palpate.mechanics.elastic.partial_factor import partial_factor
+from palpate.mechanics.press_solver.condensing import Assembly
+from palpate.mechanics.press_solver.graded_mesh import GradedMesh
+from palpate.mechanics.press_solver.solid import Response, Solid
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.kernels import kernel
+from palpate.mechanics.kernels import kernel
 
 _PARTS = 3
 

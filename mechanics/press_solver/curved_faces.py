@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.kernels import kernel
-from mechanics.shape.tetmesh import vertex_normals
+from palpate.mechanics.kernels import kernel
+from palpate.mechanics.shape.tetmesh import vertex_normals
 
 _SMOOTH_COSINE = 0.85
 """A vertex normal further than some 32 degrees from a triangle's own belongs to a crease: it stays flat."""

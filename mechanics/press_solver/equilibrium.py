@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.press_solver.body import Body
-from mechanics.press_solver.contact import Grip
-from mechanics.press_solver.settling import Settled, Settling
+from palpate.mechanics.press_solver.body import Body
+from palpate.mechanics.press_solver.contact import Grip
+from palpate.mechanics.press_solver.settling import Settled, Settling
 
 _ITERATIONS = 30
 _SLOW = 0.3

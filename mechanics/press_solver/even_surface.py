@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.shape.true_shape import TrueShape
+from palpate.mechanics.shape.true_shape import TrueShape
 
 LONGEST_M = 0.003
 """Longest edge."""

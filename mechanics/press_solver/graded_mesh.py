@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.elastic.elasticity import shape_derivatives
-from mechanics.errors import MeshError
-from mechanics.press_solver.curved_faces import FeltSurface
-from mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
+from palpate.mechanics.elastic.elasticity import shape_derivatives
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.press_solver.curved_faces import FeltSurface
+from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
 
 GAUSS = np.full((4, 4), 0.1381966011250105)
 GAUSS[np.arange(4), np.arange(4)] = 0.5854101966249685

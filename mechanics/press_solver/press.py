@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.errors import OptionError
-from mechanics.press_solver.body import Body, BodyMaterial
-from mechanics.press_solver.contact import SphereContact
-from mechanics.press_solver.curved_faces import FeltSurface
-from mechanics.press_solver.equilibrium import Path
-from mechanics.press_solver.even_surface import even_surface
-from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
-from mechanics.press_solver.settling import Settling
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.press_solver.body import Body, BodyMaterial
+from palpate.mechanics.press_solver.contact import SphereContact
+from palpate.mechanics.press_solver.curved_faces import FeltSurface
+from palpate.mechanics.press_solver.equilibrium import Path
+from palpate.mechanics.press_solver.even_surface import even_surface
+from palpate.mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
+from palpate.mechanics.press_solver.settling import Settling
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 _LONGEST = 1.3
 """Longest over typical edge of a tetrahedron."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from mechanics.press_solver.condensing import Condensed
-from mechanics.press_solver.contact import Grip, SphereContact, Traction
+from palpate.mechanics.press_solver.condensing import Condensed
+from palpate.mechanics.press_solver.contact import Grip, SphereContact, Traction
 
 _ROUNDS, _ITERATIONS, _SLIDING_ITERATIONS = 3, 60, 30
 _MOVED = 4e-3

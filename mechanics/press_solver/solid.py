@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.elastic.elasticity import lame_parameters, shape_derivatives
-from mechanics.kernels import kernel
-from mechanics.press_solver.graded_mesh import GAUSS
+from palpate.mechanics.elastic.elasticity import lame_parameters, shape_derivatives
+from palpate.mechanics.kernels import kernel
+from palpate.mechanics.press_solver.graded_mesh import GAUSS
 
 _LOCAL_SHARE = 0.1
 

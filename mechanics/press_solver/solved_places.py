@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.contact.depth_factors import DepthFactors
-from mechanics.contact.touch import TouchedPlaces, touch_forces
-from mechanics.disk.scratch import cache_folder
-from mechanics.disk.store import content_key, load_or_build
-from mechanics.errors import OptionError
-from mechanics.press_solver.press import LAWS, PressOptions, PressSolver
-from mechanics.progress import Progress, silent
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.contact.depth_factors import DepthFactors
+from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.disk.store import content_key, load_or_build
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.press_solver.press import LAWS, PressOptions, PressSolver
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 DEPTHS = 6
 """At which a place is solved, evenly to the deepest."""

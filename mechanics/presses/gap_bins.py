@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.presses.table import HOLDING, LOADING, UNLOADING
+from palpate.mechanics.presses.table import HOLDING, LOADING, UNLOADING
 
 THIRDS = 3
 PHASES = (LOADING, HOLDING, UNLOADING)

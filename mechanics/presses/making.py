@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.presses.repeats import sites_of
-from mechanics.presses.table import STEP_S, USUAL_NOISE_N, Noise, Presses
+from palpate.mechanics.presses.repeats import sites_of
+from palpate.mechanics.presses.table import STEP_S, USUAL_NOISE_N, Noise, Presses
 
 
 @dataclass(frozen=True)

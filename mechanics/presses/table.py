@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import ModelError
-from mechanics.frames import local_frames
-from mechanics.recording.segments import Segment, delayed, within
+from palpate.mechanics.errors import ModelError
+from palpate.mechanics.frames import local_frames
+from palpate.mechanics.recording.segments import Segment, delayed, within
 
 FITS = ("k_kv", "b_kv", "k_hc", "b_hc", "r_hc", "k_v", "k_c", "r_c", "k_h", "e_pa")
 """What is fitted to each press: Kelvin-Voigt, eq. (1): k_kv N/m, b_kv N s/m; Hunt-Crossley, eq. (2): k_hc

@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.reading import read_toml
-from mechanics.disk.schema import ANY, Key, Schema, check_table
-from mechanics.disk.toml_text import dump_toml
-from mechanics.disk.writing import Kind, atomic_file
-from mechanics.errors import RecordingError
-from mechanics.quantities import TIP_RADIUS
-from mechanics.recording.segments import delayed
-from mechanics.recording.side_of_play import leads, play
-from mechanics.result import Result
+from palpate.mechanics.disk.reading import read_toml
+from palpate.mechanics.disk.schema import ANY, Key, Schema, check_table
+from palpate.mechanics.disk.toml_text import dump_toml
+from palpate.mechanics.disk.writing import Kind, atomic_file
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.quantities import TIP_RADIUS
+from palpate.mechanics.recording.segments import delayed
+from palpate.mechanics.recording.side_of_play import leads, play
+from palpate.mechanics.result import Result
 
 SCHEMA: Schema = {
     "calibration": ANY,

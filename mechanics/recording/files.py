@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.reading import no_file, reading
-from mechanics.disk.schema import ANY, Key, Listed, Schema
-from mechanics.disk.surface_files import UNITS
-from mechanics.disk.writing import Kind
-from mechanics.errors import RecordingError
-from mechanics.quantities import POISSON_RATIO, TIP_RADIUS
-from mechanics.recording.segments import STATED
+from palpate.mechanics.disk.reading import no_file, reading
+from palpate.mechanics.disk.schema import ANY, Key, Listed, Schema
+from palpate.mechanics.disk.surface_files import UNITS
+from palpate.mechanics.disk.writing import Kind
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS
+from palpate.mechanics.recording.segments import STATED
 
 REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
 QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")

@@ -18,15 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.reading import named_in, read_toml, sha256_of_file
-from mechanics.disk.schema import check_table
-from mechanics.disk.store import content_key
-from mechanics.disk.toml_text import dump_toml
-from mechanics.disk.writing import atomic_file, check_target
-from mechanics.errors import PalpateWarning, RecordingError
-from mechanics.quantities import POISSON_RATIO
-from mechanics.recording.calibration import Calibration, read_calibration
-from mechanics.recording.files import (
+from palpate.mechanics.disk.reading import named_in, read_toml, sha256_of_file
+from palpate.mechanics.disk.schema import check_table
+from palpate.mechanics.disk.store import content_key
+from palpate.mechanics.disk.toml_text import dump_toml
+from palpate.mechanics.disk.writing import atomic_file, check_target
+from palpate.mechanics.errors import PalpateWarning, RecordingError
+from palpate.mechanics.quantities import POISSON_RATIO
+from palpate.mechanics.recording.calibration import Calibration, read_calibration
+from palpate.mechanics.recording.files import (
     QUATERNION_COLUMNS,
     REQUIRED_COLUMNS,
     SAMPLES,
@@ -36,9 +36,9 @@ from mechanics.recording.files import (
     recording_files,
     samples_path,
 )
-from mechanics.recording.sane import check_sane
-from mechanics.recording.segments import STATED, Segment
-from mechanics.result import Result
+from palpate.mechanics.recording.sane import check_sane
+from palpate.mechanics.recording.segments import STATED, Segment
+from palpate.mechanics.result import Result
 
 _QUICKEST_HZ = 2e4
 """No hand's exploration is sampled faster: a slower clock is then no clock in milliseconds."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.bounds import LARGEST_N
-from mechanics.errors import RecordingError
-from mechanics.recording.files import MOST_SAMPLES
+from palpate.mechanics.bounds import LARGEST_N
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.recording.files import MOST_SAMPLES
 
 WIDEST_PATH_M = 1.5
 """Greatest extent of a recorded path: objects are at most 1 m."""

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 
 def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float], grade: float = 1.0) -> TetMesh:

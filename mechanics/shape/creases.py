@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from mechanics.shape.nearest import neighbours
+from palpate.mechanics.shape.nearest import neighbours
 
 CREASE_DEGREES = 35.0
 _CREASE_SAG_M = 3e-4

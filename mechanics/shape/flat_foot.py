@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.disk.surface_files import ClosedSurface
-from mechanics.errors import PalpateWarning, SurfaceError
-from mechanics.shape.nearest import triangle_areas
+from palpate.mechanics.disk.surface_files import ClosedSurface
+from palpate.mechanics.errors import PalpateWarning, SurfaceError
+from palpate.mechanics.shape.nearest import triangle_areas
 
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
 """Directions out of the support along the axes of the file's frame."""

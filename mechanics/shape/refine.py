@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.robust import weighted_median
-from mechanics.shape.nearest import triangle_areas
-from mechanics.shape.tetmesh import EDGES, TetMesh
+from palpate.mechanics.robust import weighted_median
+from palpate.mechanics.shape.nearest import triangle_areas
+from palpate.mechanics.shape.tetmesh import EDGES, TetMesh
 
 
 def typical_edge(mesh: TetMesh) -> float:

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.errors import MeshError
-from mechanics.shape.true_shape import TrueShape
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.shape.true_shape import TrueShape
 
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner triples of a tetrahedron's faces, outward for positive volume; face i is opposite to corner i."""

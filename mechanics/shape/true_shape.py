@@ -14,9 +14,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from mechanics.disk.store import content_key
-from mechanics.shape.creases import Facets, angle_between, corner_normals_of, facets_of
-from mechanics.shape.nearest import closest
+from palpate.mechanics.disk.store import content_key
+from palpate.mechanics.shape.creases import Facets, angle_between, corner_normals_of, facets_of
+from palpate.mechanics.shape.nearest import closest
 
 _SAME_SIDE = np.cos(np.radians(50))
 _FACING = np.cos(np.radians(75))

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.ndimage import label, maximum, median_filter
 
-from mechanics.recording.segments import runs, within
-from mechanics.robust import spread_about_zero
-from reconstruct.checks.finding import Finding, decades_of_tail, p_words, sure
-from reconstruct.checks.samples import CHANNELS, Samples
+from palpate.mechanics.recording.segments import runs, within
+from palpate.mechanics.robust import spread_about_zero
+from palpate.reconstruction.checks.finding import Finding, decades_of_tail, p_words, sure
+from palpate.reconstruction.checks.samples import CHANNELS, Samples
 
 _NINE_OF_TEN = 1.645
 """Standard deviations within which nine of ten readings of a Gaussian lie."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mechanics.recording.recording import Recording
-from mechanics.result import Result
-from reconstruct.checks.finding import Finding
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.result import Result
+from palpate.reconstruction.checks.finding import Finding
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mechanics.recording.segments import runs
-from reconstruct.checks.finding import Finding
-from reconstruct.checks.samples import Samples
+from palpate.mechanics.recording.segments import runs
+from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.samples import Samples
 
 _TOLD = 0.02
 _GAP, _GAP_S, _PAUSE_S = 5.0, 0.05, 1.0

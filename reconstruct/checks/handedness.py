@@ -14,9 +14,9 @@ from itertools import permutations, product
 
 import numpy as np
 
-from mechanics.presses.repeats import SITE_M, sites_of
-from reconstruct.checks.finding import SURE_ODDS, Finding
-from reconstruct.checks.samples import Samples
+from palpate.mechanics.presses.repeats import SITE_M, sites_of
+from palpate.reconstruction.checks.finding import SURE_ODDS, Finding
+from palpate.reconstruction.checks.samples import Samples
 
 _LEAST_SITES = 5
 _LEAST_ANGLE_RAD = 0.15

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.presses.table import Presses
-from reconstruct.checks.finding import Finding
-from reconstruct.steps.s7_modulus.modulus import ModulusFit
+from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 
 LEAST_PA, MOST_PA = 500.0, 5e6
 _MISFIT = 0.5

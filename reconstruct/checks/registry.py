@@ -10,23 +10,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.errors import ContactError, NoBaseError, RecordingError
-from mechanics.model.files import read_model
-from mechanics.recording.recording import Recording, base_model_of
-from reconstruct.checks.air import air, delay
-from reconstruct.checks.channels import channels
-from reconstruct.checks.clock import clock
-from reconstruct.checks.finding import Finding
-from reconstruct.checks.handedness import handedness
-from reconstruct.checks.outcome import Outcome, outcome
-from reconstruct.checks.samples import Samples
-from reconstruct.checks.support import dropped, support
-from reconstruct.checks.units import QUANTITIES, measured, settled
-from reconstruct.geometry.known_base import base_of_model
-from reconstruct.geometry.stated import GeometryOptions, stated_geometry
-from reconstruct.steps.s1_filter.low_pass import FilterOptions
-from reconstruct.steps.s3_contacts.contacts import Exploration, explore
-from reconstruct.steps.s3_contacts.first_touch import ContactSpans
+from palpate.mechanics.errors import ContactError, NoBaseError, RecordingError
+from palpate.mechanics.model.files import read_model
+from palpate.mechanics.recording.recording import Recording, base_model_of
+from palpate.reconstruction.checks.air import air, delay
+from palpate.reconstruction.checks.channels import channels
+from palpate.reconstruction.checks.clock import clock
+from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.handedness import handedness
+from palpate.reconstruction.checks.outcome import Outcome, outcome
+from palpate.reconstruction.checks.samples import Samples
+from palpate.reconstruction.checks.support import dropped, support
+from palpate.reconstruction.checks.units import QUANTITIES, measured, settled
+from palpate.reconstruction.geometry.known_base import base_of_model
+from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
+from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions
+from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
+from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
 
 OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)

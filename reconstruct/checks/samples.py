@@ -10,11 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.recording.recording import Recording
-from reconstruct.steps.s1_filter.low_pass import FilterOptions, white_noise_std
-from reconstruct.steps.s1_filter.signals import Filtered, filtered_of
-from reconstruct.steps.s3_contacts.first_touch import ContactSpans, RoughTouches
-from reconstruct.steps.s3_contacts.force_delay import Delay
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions, white_noise_std
+from palpate.reconstruction.steps.s1_filter.signals import Filtered, filtered_of
+from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans, RoughTouches
+from palpate.reconstruction.steps.s3_contacts.force_delay import Delay
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
 _LATTICE = 0.02  # of a step: how well increments must be its multiples

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mechanics.robust import spread_about_zero, weighted_median
-from reconstruct.checks.finding import Finding
-from reconstruct.steps.s3_contacts.contacts import Exploration
-from reconstruct.steps.s3_contacts.on_support import supported
+from palpate.mechanics.robust import spread_about_zero, weighted_median
+from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
+from palpate.reconstruction.steps.s3_contacts.on_support import supported
 
 _BELOW = 6.0
 _SCALE = 1.35

@@ -14,10 +14,10 @@ from itertools import product
 import numpy as np
 from scipy.stats import norm
 
-from mechanics.recording.recording import Recording
-from mechanics.robust import weighted_quantile
-from reconstruct.checks.finding import SURE_ODDS, Finding, p_words, sure
-from reconstruct.checks.samples import Samples, Units
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.robust import weighted_quantile
+from palpate.reconstruction.checks.finding import SURE_ODDS, Finding, p_words, sure
+from palpate.reconstruction.checks.samples import Samples, Units
 
 READINGS = {
     "time": {"s": 1.0, "ms": 1e3, "us": 1e6},

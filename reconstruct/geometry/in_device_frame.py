@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.frames import support_axes
-from mechanics.recording.recording import Recording
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.geometry.known_base import base_of_rim
-from reconstruct.steps.s2_base.boundary import Boundary
-from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s7_modulus.shape_error import PoseError
+from palpate.mechanics.frames import support_axes
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.geometry.known_base import base_of_rim
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError
 
 
 @dataclass(frozen=True)

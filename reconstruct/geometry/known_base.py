@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.errors import ContactError
-from mechanics.frames import tangents
-from mechanics.model.model import Model
-from reconstruct.steps.s2_base.boundary import Boundary
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.model.model import Model
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
 
 
 def base_of_model(model: Model, tip_radius_m: float) -> Boundary:

@@ -11,31 +11,31 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.disk.surface_files import ClosedSurface, read_surface
-from mechanics.errors import ContactError, SurfaceError
-from mechanics.presses.table import Presses
-from mechanics.progress import Progress, silent
-from mechanics.recording.recording import Recording
-from mechanics.shape.flat_foot import Standing, standing
-from mechanics.shape.tetmesh import vertex_normals
-from mechanics.shape.true_shape import TrueShape
-from reconstruct.geometry.in_device_frame import Placed, foot_rim
-from reconstruct.geometry.known_base import base_of_rim
-from reconstruct.geometry.registration import (
+from palpate.mechanics.disk.surface_files import ClosedSurface, read_surface
+from palpate.mechanics.errors import ContactError, SurfaceError
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.shape.flat_foot import Standing, standing
+from palpate.mechanics.shape.tetmesh import vertex_normals
+from palpate.mechanics.shape.true_shape import TrueShape
+from palpate.reconstruction.geometry.in_device_frame import Placed, foot_rim
+from palpate.reconstruction.geometry.known_base import base_of_rim
+from palpate.reconstruction.geometry.registration import (
     SURFACE_SD_M,
     Body,
     Registration,
     Touched,
     register,
 )
-from reconstruct.geometry.slab import place_slab
-from reconstruct.geometry.stated import GeometryOptions
-from reconstruct.shapes.coarse_drawing import decimated
-from reconstruct.shapes.polyhedron import refine
-from reconstruct.steps.s2_base.boundary import BoundaryOptions
-from reconstruct.steps.s3_contacts.contacts import Exploration
-from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s7_modulus.shape_error import PoseError
+from palpate.reconstruction.geometry.slab import place_slab
+from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.reconstruction.shapes.coarse_drawing import decimated
+from palpate.reconstruction.shapes.polyhedron import refine
+from palpate.reconstruction.steps.s2_base.boundary import BoundaryOptions
+from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
+from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError
 
 _ALIKE = 1.5
 """A rival pose whose residual is less than this times the best one's cannot be ruled out."""

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mechanics.disk.surface_files import UNITS
-from mechanics.errors import OptionError
-from mechanics.options import option
-from mechanics.recording.recording import Recording
+from palpate.mechanics.disk.surface_files import UNITS
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import option
+from palpate.mechanics.recording.recording import Recording
 
 POSES = ("auto", "given")
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.disk.reading import reading
-from mechanics.errors import RecordingError
+from palpate.mechanics.disk.reading import reading
+from palpate.mechanics.errors import RecordingError
 
 
 @dataclass(frozen=True)

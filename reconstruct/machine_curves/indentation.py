@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.errors import RecordingError
+from palpate.mechanics.errors import RecordingError
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import nnls
 
-from mechanics.errors import RecordingError
+from palpate.mechanics.errors import RecordingError
 
 BLOCKS = 8
 _MOST_ROWS = 300

@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from mechanics.errors import RecordingError
-from reconstruct.machine_curves.compression import exported, read_compression
+from palpate.mechanics.errors import RecordingError
+from palpate.reconstruction.machine_curves.compression import exported, read_compression
 
 MOST_STRAIN = 0.4
 BLOCKS = 8

@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.errors import SurfaceError
-from reconstruct.shapes.cap import Cap
-from reconstruct.shapes.crown import Crown
-from reconstruct.shapes.cushion import Cushion
-from reconstruct.shapes.dish import Dish
-from reconstruct.shapes.dome import Dome
-from reconstruct.shapes.evidence import Evidence
-from reconstruct.shapes.fit import Seen
-from reconstruct.shapes.outline import Outline, circle, polygon, seeing_centre, smooth_curve
-from reconstruct.shapes.polyhedron import Polyhedron
-from reconstruct.shapes.prism import Prism
-from reconstruct.shapes.shape import Shape
+from palpate.mechanics.errors import SurfaceError
+from palpate.reconstruction.shapes.cap import Cap
+from palpate.reconstruction.shapes.crown import Crown
+from palpate.reconstruction.shapes.cushion import Cushion
+from palpate.reconstruction.shapes.dish import Dish
+from palpate.reconstruction.shapes.dome import Dome
+from palpate.reconstruction.shapes.evidence import Evidence
+from palpate.reconstruction.shapes.fit import Seen
+from palpate.reconstruction.shapes.outline import Outline, circle, polygon, seeing_centre, smooth_curve
+from palpate.reconstruction.shapes.polyhedron import Polyhedron
+from palpate.reconstruction.shapes.prism import Prism
+from palpate.reconstruction.shapes.shape import Shape
 
 FITTED = (
     "cylinder",

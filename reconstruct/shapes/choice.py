@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechanics.errors import SurfaceError
-from mechanics.progress import Progress, silent
-from mechanics.shape.nearest import distance
-from reconstruct.shapes.candidates import first_guesses
-from reconstruct.shapes.drawing import draw
-from reconstruct.shapes.evidence import Evidence
-from reconstruct.shapes.fit import Seen, fit
-from reconstruct.shapes.kriging import Explained, explain
+from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.nearest import distance
+from palpate.reconstruction.shapes.candidates import first_guesses
+from palpate.reconstruction.shapes.drawing import draw
+from palpate.reconstruction.shapes.evidence import Evidence
+from palpate.reconstruction.shapes.fit import Seen, fit
+from palpate.reconstruction.shapes.kriging import Explained, explain
 
 _CORRECTED = 6
 """So many of the best shapes are tried with a free residual field as well."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.frames import support_axes
-from mechanics.shape.flat_foot import Standing
-from reconstruct.shapes.drawing import corner_normals, moved, signed_gap
+from palpate.mechanics.frames import support_axes
+from palpate.mechanics.shape.flat_foot import Standing
+from palpate.reconstruction.shapes.drawing import corner_normals, moved, signed_gap
 
 _SAMPLES = np.array([[1 / 3, 1 / 3, 1 / 3], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
 _WEIGHTS = np.array([-27, 25, 25, 25]) / 48

@@ -7,11 +7,11 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.spatial import Delaunay, HalfspaceIntersection, QhullError
 
-from mechanics.errors import SurfaceError
-from mechanics.shape.nearest import distance
-from reconstruct.shapes.evidence import Evidence
-from reconstruct.shapes.fit import LEAN_M
-from reconstruct.shapes.points import farthest_points
+from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.shape.nearest import distance
+from palpate.reconstruction.shapes.evidence import Evidence
+from palpate.reconstruction.shapes.fit import LEAN_M
+from palpate.reconstruction.shapes.points import farthest_points
 
 _SECTORS = 48
 

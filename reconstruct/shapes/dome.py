@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reconstruct.shapes.outline import Outline
-from reconstruct.shapes.shape import Parameter, project, rings_to_mesh, values_of, with_values
+from palpate.reconstruction.shapes.outline import Outline
+from palpate.reconstruction.shapes.shape import Parameter, project, rings_to_mesh, values_of, with_values
 
 
 @dataclass(frozen=True)

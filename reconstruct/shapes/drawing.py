@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.shape.nearest import closest
-from reconstruct.shapes.kriging import Explained
+from palpate.mechanics.shape.nearest import closest
+from palpate.reconstruction.shapes.kriging import Explained
 
 _EDGE_COSINE = np.cos(np.radians(40))
 _ROUNDING_M = 0.010

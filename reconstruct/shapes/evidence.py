@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.errors import SurfaceError
-from mechanics.frames import support_axes
-from mechanics.presses.repeats import sites_of
+from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.frames import support_axes
+from palpate.mechanics.presses.repeats import sites_of
 
 LEAST_TOUCHES = 4
 """Fewer carry no surface."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from reconstruct.shapes.evidence import Evidence
-from reconstruct.shapes.shape import Shape, values_of
+from palpate.reconstruction.shapes.evidence import Evidence
+from palpate.reconstruction.shapes.shape import Shape, values_of
 
 LEAN_M, LEAN_SPREAD_M = 0.00025, 0.0002
 """How far a tracing hand leans the tip into the object's foot: prior mean and standard deviation."""

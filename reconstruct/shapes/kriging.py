@@ -15,10 +15,10 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from mechanics.gaussian import matern_3_2
-from mechanics.robust import spread_about_zero
-from reconstruct.shapes.fit import LEAN_SPREAD_M, OUTLINE_ERROR_M, Seen, residuals
-from reconstruct.shapes.shape import Shape, gradient, parameter_slopes
+from palpate.mechanics.gaussian import matern_3_2
+from palpate.mechanics.robust import spread_about_zero
+from palpate.reconstruction.shapes.fit import LEAN_SPREAD_M, OUTLINE_ERROR_M, Seen, residuals
+from palpate.reconstruction.shapes.shape import Shape, gradient, parameter_slopes
 
 _TURN = 0.6
 """Covariance falls to 1/e^(1/2) where normals differ by this chord (0.6: 35 degrees)."""

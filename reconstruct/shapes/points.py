@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.robust import biweight
+from palpate.mechanics.robust import biweight
 
 STEP_M, LEAST_STEPS = 0.0005, 20
 """Between the points of a traced path that is resampled; fewer of them tell nothing."""

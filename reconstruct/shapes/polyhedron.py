@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
-from mechanics.errors import SurfaceError
-from reconstruct.shapes.convex_bounds import delaunay_hull
-from reconstruct.shapes.outline import Outline, sides
-from reconstruct.shapes.shape import Parameter, values_of, with_values
+from palpate.mechanics.errors import SurfaceError
+from palpate.reconstruction.shapes.convex_bounds import delaunay_hull
+from palpate.reconstruction.shapes.outline import Outline, sides
+from palpate.reconstruction.shapes.shape import Parameter, values_of, with_values
 
 _ON_PLANE_M = 0.0005
 _TOPS_AT_MOST = 5

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reconstruct.shapes.outline import Outline, corners, sides
-from reconstruct.shapes.shape import Parameter, rings_to_mesh, with_values
+from palpate.reconstruction.shapes.outline import Outline, corners, sides
+from palpate.reconstruction.shapes.shape import Parameter, rings_to_mesh, with_values
 
 
 def _outline_parameters(outline: Outline) -> tuple[Parameter, ...]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from mechanics.contact.dent import dent_load
-from mechanics.contact.touch import touch_remember
-from mechanics.effects.laws_along_path import sharp_laws, smooth_laws
-from mechanics.kernels import part
-from render.surface.contact import release
-from render.surface.walking import foot
+from palpate.mechanics.contact.dent import dent_load
+from palpate.mechanics.contact.touch import touch_remember
+from palpate.mechanics.effects.laws_along_path import sharp_laws, smooth_laws
+from palpate.mechanics.kernels import part
+from palpate.render.surface.contact import release
+from palpate.render.surface.walking import foot
 
 
 @part

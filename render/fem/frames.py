@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.kernels import inner, part
+from palpate.mechanics.kernels import inner, part
 
 
 @part

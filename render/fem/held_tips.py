@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.compliance.compression import between_mixed, mix_factor
-from mechanics.kernels import inner, part
+from palpate.mechanics.compliance.compression import between_mixed, mix_factor
+from palpate.mechanics.kernels import inner, part
 
 NOWHERE = -2
 

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.kernels import step_kernel
-from render.fem.end_of_tick import conclude, forget
-from render.fem.frames import new_frame
-from render.fem.held_tips import carry_all, leave, link, locate, renew
-from render.fem.stick_slip import settle, solve_one, unsettled
-from render.surface.contact import approach, lose, release, strayed
+from palpate.mechanics.kernels import step_kernel
+from palpate.render.fem.end_of_tick import conclude, forget
+from palpate.render.fem.frames import new_frame
+from palpate.render.fem.held_tips import carry_all, leave, link, locate, renew
+from palpate.render.fem.stick_slip import settle, solve_one, unsettled
+from palpate.render.surface.contact import approach, lose, release, strayed
 
 SWEEPS = 60
 

@@ -8,23 +8,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.compliance.near_field import surface_softness
-from mechanics.compliance.patch import half_space_compliance
-from mechanics.compliance.sites import principal_curvatures
-from mechanics.compliance.stored_compliance import load_or_condense
-from mechanics.compliance.surface_compliance import SurfaceCompliance
-from mechanics.contact.edges import edge_law
-from mechanics.errors import OptionError
-from mechanics.model.model import Model
-from mechanics.progress import Progress, silent
-from render.base import Renderer, check_radii
-from render.effects import effect_arrays, rendered_touch
-from render.fem.kernel import fem_step
-from render.fem.state import FemParameters, FemState, new_fem_state
-from render.options import RenderOptions
-from render.surface.bvh import STACK, closest_triangle
-from render.surface.contact_surface import ContactSurface
-from render.surface.snapping import touched_surface
+from palpate.mechanics.compliance.near_field import surface_softness
+from palpate.mechanics.compliance.patch import half_space_compliance
+from palpate.mechanics.compliance.sites import principal_curvatures
+from palpate.mechanics.compliance.stored_compliance import load_or_condense
+from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
+from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.progress import Progress, silent
+from palpate.render.base import Renderer, check_radii
+from palpate.render.effects import effect_arrays, rendered_touch
+from palpate.render.fem.kernel import fem_step
+from palpate.render.fem.state import FemParameters, FemState, new_fem_state
+from palpate.render.options import RenderOptions
+from palpate.render.surface.bvh import STACK, closest_triangle
+from palpate.render.surface.contact_surface import ContactSurface
+from palpate.render.surface.snapping import touched_surface
 
 NAME = "fem"
 

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.contact.touch import STATE_SIZE
-from mechanics.effects.laws_along_path import new_memory
-from render.base import Grip, new_grip, new_state
-from render.effects import EffectArrays
-from render.surface.bvh import STACK
-from render.surface.contact_surface import SurfaceArrays
+from palpate.mechanics.contact.touch import STATE_SIZE
+from palpate.mechanics.effects.laws_along_path import new_memory
+from palpate.render.base import Grip, new_grip, new_state
+from palpate.render.effects import EffectArrays
+from palpate.render.surface.bvh import STACK
+from palpate.render.surface.contact_surface import SurfaceArrays
 
 
 class FemParameters(NamedTuple):

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.contact.dent import BENT
-from mechanics.contact.touch import touch_solve
-from mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
-from mechanics.kernels import part
-from render.fem.frames import turn_frame
-from render.fem.held_tips import carry
-from render.surface.walking import place, walk
+from palpate.mechanics.contact.dent import BENT
+from palpate.mechanics.contact.touch import touch_solve
+from palpate.mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
+from palpate.mechanics.kernels import part
+from palpate.render.fem.frames import turn_frame
+from palpate.render.fem.held_tips import carry
+from palpate.render.surface.walking import place, walk
 
 CONVERGED_N = 1e-5
 

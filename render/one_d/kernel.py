@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.kernels import inner, step_kernel
-from render.base import Grip, new_grip, new_state
-from render.surface.bvh import STACK
-from render.surface.contact import approach, lose, release
-from render.surface.contact_surface import SurfaceArrays
-from render.surface.walking import foot
+from palpate.mechanics.kernels import inner, step_kernel
+from palpate.render.base import Grip, new_grip, new_state
+from palpate.render.surface.bvh import STACK
+from palpate.render.surface.contact import approach, lose, release
+from palpate.render.surface.contact_surface import SurfaceArrays
+from palpate.render.surface.walking import foot
 
 RATE_FILTER_S = 0.01  # positions come in steps of some 30 um: a raw difference is no velocity
 _NEWTON = 20

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechanics.errors import OptionError
-from mechanics.model.model import Model
-from mechanics.model.one_d_laws import LAWS, Law, spread_law
-from mechanics.progress import Progress, silent
-from render.base import Renderer, check_radii
-from render.one_d.kernel import OneDParameters, OneDState, new_one_d_state, one_d_step
-from render.options import RenderOptions
-from render.surface.snapping import touched_surface
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.model.one_d_laws import LAWS, Law, spread_law
+from palpate.mechanics.progress import Progress, silent
+from palpate.render.base import Renderer, check_radii
+from palpate.render.one_d.kernel import OneDParameters, OneDState, new_one_d_state, one_d_step
+from palpate.render.options import RenderOptions
+from palpate.render.surface.snapping import touched_surface
 
 
 class OneDRenderer(Renderer):

@@ -16,15 +16,15 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.effects.friction_slip import EFFECT as SLIP
-from mechanics.errors import OptionError, PalpateError
-from mechanics.key_values import number, pairs, words_of
-from mechanics.model.model import Model
-from mechanics.shape.refine import refined_around
-from mechanics.shape.tetmesh import TetMesh
-from render.base import Renderer, check_radii
-from render.options import RenderOptions
-from render.surface.snapping import touched_surface
+from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
+from palpate.mechanics.errors import OptionError, PalpateError
+from palpate.mechanics.key_values import number, pairs, words_of
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.shape.refine import refined_around
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.base import Renderer, check_radii
+from palpate.render.options import RenderOptions
+from palpate.render.surface.snapping import touched_surface
 
 NEAR_M, AWAY_M = 0.5e-3, 1e-3
 """Of the tip's surface from the object: where a world begins, and where it ends."""

@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.progress import Progress, silent
-from mechanics.shape.tetmesh import TetMesh
-from render.options import BEST, DOCUMENTED
-from render.simulators.base import SteppedAdapter, SteppedWorld, World, made
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.simulators.base import SteppedAdapter, SteppedWorld, World, made
 
 if TYPE_CHECKING:
-    from mechanics.model.model import Model
-    from render.base import Renderer
-    from render.options import RenderOptions
+    from palpate.mechanics.model.model import Model
+    from palpate.render.base import Renderer
+    from palpate.render.options import RenderOptions
 
 DENSITY_KG_M3 = 1000.0
 HEAVY_KG = 1e6

@@ -16,15 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.progress import Progress, silent
-from mechanics.shape.tetmesh import TetMesh
-from render.options import BEST, DOCUMENTED
-from render.simulators.base import SteppedAdapter, SteppedWorld, World, made
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.simulators.base import SteppedAdapter, SteppedWorld, World, made
 
 if TYPE_CHECKING:
-    from mechanics.model.model import Model
-    from render.base import Renderer
-    from render.options import RenderOptions
+    from palpate.mechanics.model.model import Model
+    from palpate.render.base import Renderer
+    from palpate.render.options import RenderOptions
 
 POISSON_LIMIT = 0.45
 """Beyond it linear tetrahedra lock, and the solver of the elastic forces does not converge at 0.49."""

@@ -15,17 +15,17 @@ from scipy.linalg import solve_triangular
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from mechanics.elastic import pardiso
-from mechanics.errors import OptionError
-from mechanics.progress import Progress, silent
-from mechanics.shape.tetmesh import TetMesh
-from render.options import BEST, DOCUMENTED
-from render.simulators.base import Adapter, World, made
+from palpate.mechanics.elastic import pardiso
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.simulators.base import Adapter, World, made
 
 if TYPE_CHECKING:
-    from mechanics.model.model import Model
-    from render.base import Renderer
-    from render.options import RenderOptions
+    from palpate.mechanics.model.model import Model
+    from palpate.render.base import Renderer
+    from palpate.render.options import RenderOptions
 
 
 @dataclass(frozen=True)

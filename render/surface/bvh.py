@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.kernels import kernel
+from palpate.mechanics.kernels import kernel
 
 _LEAF = 4
 STACK = 128

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.kernels import inner, kernel
-from render.surface.bvh import closest_triangle
-from render.surface.walking import foot
+from palpate.mechanics.kernels import inner, kernel
+from palpate.render.surface.bvh import closest_triangle
+from palpate.render.surface.walking import foot
 
 SWEEP_STEPS = 24
 CLEAR = 1e-6  # m off the surface that counts as outside, whatever rounding says

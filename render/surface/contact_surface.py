@@ -17,18 +17,18 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mechanics.errors import MeshError
-from mechanics.shape.nearest import neighbours
-from mechanics.shape.tetmesh import TetMesh
-from render.surface.bvh import Bvh, build_bvh
-from render.surface.shaped import (
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.shape.nearest import neighbours
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.render.surface.bvh import Bvh, build_bvh
+from palpate.render.surface.shaped import (
     EASED_AGREEMENT,
     EDGE_ROUNDING_M,
     NORMAL_SMOOTHING_M,
     halved_where_bent,
     on_shape,
 )
-from render.surface.triangles import faces, pseudonormals
+from palpate.render.surface.triangles import faces, pseudonormals
 
 CREASE_DEGREES = 35.0
 

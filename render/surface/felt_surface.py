@@ -18,18 +18,18 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.contact.touch import TouchedPlaces, touch_forces
-from mechanics.disk.store import content_key
-from mechanics.disk.toml_text import plain
-from mechanics.disk.vtk_files import vtk_bytes
-from mechanics.disk.writing import atomic_file
-from mechanics.model.model import Model
-from render.base import Renderer
-from render.effects import rendered_touch
-from render.fem.renderer import FemRenderer
-from render.options import RenderOptions
-from render.surface.snapping import surface_uncertainty, touched_surface
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
+from palpate.mechanics.disk.store import content_key
+from palpate.mechanics.disk.toml_text import plain
+from palpate.mechanics.disk.vtk_files import vtk_bytes
+from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.model.model import Model
+from palpate.render.base import Renderer
+from palpate.render.effects import rendered_touch
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
+from palpate.render.surface.snapping import surface_uncertainty, touched_surface
 
 FILE = "surface.vtp"
 OWN_DEPTH_M = 1e-3

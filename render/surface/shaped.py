@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from mechanics.shape.true_shape import TrueShape
-from render.surface.triangles import cut, cut_beside, pseudonormals
+from palpate.mechanics.shape.true_shape import TrueShape
+from palpate.render.surface.triangles import cut, cut_beside, pseudonormals
 
 SAG_M = 8e-6
 """Between the middle of a fine edge and the shape: what is more is halved."""

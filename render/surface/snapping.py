@@ -15,12 +15,17 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.model.model import Model
-from render.options import RenderOptions
-from render.surface.bvh import STACK, closest_triangle
-from render.surface.contact import outside
-from render.surface.contact_surface import ContactSurface, SurfaceArrays, contact_surface, with_vertices
-from render.surface.walking import place
+from palpate.mechanics.model.model import Model
+from palpate.render.options import RenderOptions
+from palpate.render.surface.bvh import STACK, closest_triangle
+from palpate.render.surface.contact import outside
+from palpate.render.surface.contact_surface import (
+    ContactSurface,
+    SurfaceArrays,
+    contact_surface,
+    with_vertices,
+)
+from palpate.render.surface.walking import place
 
 REACH_M = 0.012  # correlation length of shape errors: about a mesh edge
 DOUBT_M = 1e-3  # their size

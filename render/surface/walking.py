@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.kernels import inner, kernel, shared_part
+from palpate.mechanics.kernels import inner, kernel, shared_part
 
 FOOT_STEPS = 12
 WALK_EDGES = 64

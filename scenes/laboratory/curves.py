@@ -19,13 +19,13 @@ from types import ModuleType
 
 import numpy as np
 
-from mechanics.disk.writing import atomic_file, check_room
-from mechanics.progress import Progress, silent
-from scenes.laboratory.linear import LinearProblem
-from scenes.laboratory.mesh import coarse_mesh, laboratory_cache
-from scenes.laboratory.solver import LabError
-from scenes.laboratory.specimen import Fineness, Specimen, build, phantom_key
-from scenes.phantoms import Phantom
+from palpate.mechanics.disk.writing import atomic_file, check_room
+from palpate.mechanics.progress import Progress, silent
+from palpate.scenes.laboratory.linear import LinearProblem
+from palpate.scenes.laboratory.mesh import coarse_mesh, laboratory_cache
+from palpate.scenes.laboratory.solver import LabError
+from palpate.scenes.laboratory.specimen import Fineness, Specimen, build, phantom_key
+from palpate.scenes.phantoms import Phantom
 
 LOADING = np.array([0.0, 0.03, 0.08, 0.16, 0.26, 0.38, 0.51, 0.64, 0.78, 0.9, 1.0])
 """States that are kept of a straight press, as shares of its greatest depth."""

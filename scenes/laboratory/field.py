@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import Surface
 
 Field = tuple[tuple[tuple[float, ...], ...], tuple[tuple[float, float], ...], float]
 """waves: (amplitude of ln E, wave vector x, y, z in rad/mm, phase). layers: (thickness mm, ln of the modulus)

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numba
 import numpy as np
 
-from scenes.laboratory.motion import Motion
-from scenes.laboratory.paths import TouchForce
+from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.paths import TouchForce
 
 
 def elastic_force(motion: Motion, touches: Sequence[TouchForce], modulus_pa: float) -> np.ndarray:

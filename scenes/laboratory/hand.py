@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.options import option
+from palpate.mechanics.options import option
 
 
 @dataclass(frozen=True)

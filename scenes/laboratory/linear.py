@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.elastic.partial_factor import partial_factor
-from scenes.laboratory.assembly import Assembly
-from scenes.laboratory.contact import Grip, SphereContact
-from scenes.laboratory.solid import Solid
-from scenes.laboratory.solver import LabError
-from scenes.laboratory.touching import Touching
+from palpate.mechanics.elastic.partial_factor import partial_factor
+from palpate.scenes.laboratory.assembly import Assembly
+from palpate.scenes.laboratory.contact import Grip, SphereContact
+from palpate.scenes.laboratory.solid import Solid
+from palpate.scenes.laboratory.solver import LabError
+from palpate.scenes.laboratory.touching import Touching
 
 
 @dataclass(frozen=True)

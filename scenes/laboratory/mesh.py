@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.disk.scratch import cache_folder
-from mechanics.disk.writing import atomic_file, temporary_folder
-from mechanics.errors import MeshError
-from scenes.laboratory.refine import boundary_faces, refine
-from scenes.laboratory.surface import Surface
-from scenes.phantoms import Phantom
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.disk.writing import atomic_file, temporary_folder
+from palpate.mechanics.errors import MeshError
+from palpate.scenes.laboratory.refine import boundary_faces, refine
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.phantoms import Phantom
 
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 

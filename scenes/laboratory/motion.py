@@ -9,13 +9,13 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk, straying
-from scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
-from scenes.laboratory.presses import Touch
-from scenes.laboratory.support_and_air import on_the_support, waving
-from scenes.laboratory.surface import Surface
-from scenes.laboratory.tracing import RATE_HZ, Trace
-from scenes.phantoms import Phantom
+from palpate.scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk, straying
+from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
+from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.support_and_air import on_the_support, waving
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.tracing import RATE_HZ, Trace
+from palpate.scenes.phantoms import Phantom
 
 NEAR_MM = 3.0
 """Above the surface by this much the hand slows from its reach to the press."""

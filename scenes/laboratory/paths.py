@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from scenes.laboratory.curves import EVERY_CORE, LOADING, Curve, PathJob, Solving, curves
-from scenes.laboratory.presses import Touch
-from scenes.laboratory.specimen import Specimen
-from scenes.phantoms import Phantom
+from palpate.scenes.laboratory.curves import EVERY_CORE, LOADING, Curve, PathJob, Solving, curves
+from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.specimen import Specimen
+from palpate.scenes.phantoms import Phantom
 
 UNLOADING = np.array([0.93, 0.82, 0.68, 0.52, 0.36, 0.22, 0.12, 0.05, 0.0])
 """States of the way out, as shares of the depth; contact may be lost before."""

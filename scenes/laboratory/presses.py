@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.errors import OptionError, SceneError
-from scenes.laboratory.surface import Surface
-from scenes.phantoms import Phantom
+from palpate.mechanics.errors import OptionError, SceneError
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.phantoms import Phantom
 
 
 @dataclass(frozen=True)

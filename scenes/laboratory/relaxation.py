@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.laboratory.curves import PathJob, Solving, curves
-from scenes.laboratory.motion import Motion
-from scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
-from scenes.laboratory.presses import Touch
-from scenes.laboratory.specimen import Specimen
-from scenes.laboratory.tracing import RATE_HZ
-from scenes.phantoms import Phantom
+from palpate.scenes.laboratory.curves import PathJob, Solving, curves
+from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
+from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.specimen import Specimen
+from palpate.scenes.laboratory.tracing import RATE_HZ
+from palpate.scenes.phantoms import Phantom
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mechanics.disk.reading import sha256_of_file
-from mechanics.disk.writing import JSON, atomic_file
-from mechanics.errors import RecordingError
-from mechanics.recording.recording import Recording, write_recording
+from palpate.mechanics.disk.reading import sha256_of_file
+from palpate.mechanics.disk.writing import JSON, atomic_file
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.recording.recording import Recording, write_recording
 
 
 def canonical(truth: Mapping[str, Any]) -> bytes:

@@ -9,22 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.options import option
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import Segment
-from scenes.laboratory.curves import Solving
-from scenes.laboratory.effects import Readings, effect
-from scenes.laboratory.effects.solid import scaled
-from scenes.laboratory.force import elastic_force
-from scenes.laboratory.frame import axes_of, quaternions, random_frame
-from scenes.laboratory.hand import HandOptions, band_noise
-from scenes.laboratory.motion import Motion, motion
-from scenes.laboratory.paths import SIDEWAYS, TouchForce, touch_forces
-from scenes.laboratory.presses import PROTOCOLS, Touch
-from scenes.laboratory.relaxation import beyond_quasilinear
-from scenes.laboratory.specimen import Fineness, Specimen, ball
-from scenes.laboratory.tracing import RATE_HZ, trace
-from scenes.phantoms import Phantom
+from palpate.mechanics.options import option
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import Segment
+from palpate.scenes.laboratory.curves import Solving
+from palpate.scenes.laboratory.effects import Readings, effect
+from palpate.scenes.laboratory.effects.solid import scaled
+from palpate.scenes.laboratory.force import elastic_force
+from palpate.scenes.laboratory.frame import axes_of, quaternions, random_frame
+from palpate.scenes.laboratory.hand import HandOptions, band_noise
+from palpate.scenes.laboratory.motion import Motion, motion
+from palpate.scenes.laboratory.paths import SIDEWAYS, TouchForce, touch_forces
+from palpate.scenes.laboratory.presses import PROTOCOLS, Touch
+from palpate.scenes.laboratory.relaxation import beyond_quasilinear
+from palpate.scenes.laboratory.specimen import Fineness, Specimen, ball
+from palpate.scenes.laboratory.tracing import RATE_HZ, trace
+from palpate.scenes.phantoms import Phantom
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import OptionError
-from mechanics.recording.recording import Recording, read_recording, write_recording
-from mechanics.result import Result
-from scenes.laboratory.curves import EVERY_CORE, Solving
-from scenes.laboratory.effects import REGISTRY, Bench, Readings, effect
-from scenes.laboratory.motion import Motion
-from scenes.laboratory.presses import Touch, press_set
-from scenes.laboratory.session import Session, SimulateOptions, Staging
-from scenes.laboratory.truth import truth_of
-from scenes.phantoms import Phantom
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.recording.recording import Recording, read_recording, write_recording
+from palpate.mechanics.result import Result
+from palpate.scenes.laboratory.curves import EVERY_CORE, Solving
+from palpate.scenes.laboratory.effects import REGISTRY, Bench, Readings, effect
+from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.presses import Touch, press_set
+from palpate.scenes.laboratory.session import Session, SimulateOptions, Staging
+from palpate.scenes.laboratory.truth import truth_of
+from palpate.scenes.phantoms import Phantom
 
 
 @dataclass(frozen=True, eq=False, repr=False)

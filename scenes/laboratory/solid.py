@@ -11,8 +11,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from scenes.laboratory.laws import PAIRS, circled, erf, isochoric, norm
-from scenes.laboratory.mesh import GAUSS, QuadraticMesh, shape_gradients
+from palpate.scenes.laboratory.laws import PAIRS, circled, erf, isochoric, norm
+from palpate.scenes.laboratory.mesh import GAUSS, QuadraticMesh, shape_gradients
 
 _UNIT_GRADIENTS = np.array([shape_gradients(*b) for b in GAUSS])
 

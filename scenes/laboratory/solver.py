@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechanics.elastic.partial_factor import partial_factor
-from mechanics.errors import PalpateError
-from scenes.laboratory.assembly import Assembly
-from scenes.laboratory.contact import Grip, SphereContact
-from scenes.laboratory.solid import History, Solid
-from scenes.laboratory.touching import Touching
+from palpate.mechanics.elastic.partial_factor import partial_factor
+from palpate.mechanics.errors import PalpateError
+from palpate.scenes.laboratory.assembly import Assembly
+from palpate.scenes.laboratory.contact import Grip, SphereContact
+from palpate.scenes.laboratory.solid import History, Solid
+from palpate.scenes.laboratory.touching import Touching
 
 MOST_ITERATIONS = 40
 SLOW = 0.7

@@ -15,14 +15,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from scenes.laboratory.contact import SphereContact
-from scenes.laboratory.field import Field, ratio_at
-from scenes.laboratory.linear import LinearProblem
-from scenes.laboratory.mesh import QuadraticMesh, graded_mesh, surface_key
-from scenes.laboratory.solid import Material, Solid
-from scenes.laboratory.solver import Problem
-from scenes.laboratory.surface import Surface
-from scenes.phantoms import Phantom
+from palpate.scenes.laboratory.contact import SphereContact
+from palpate.scenes.laboratory.field import Field, ratio_at
+from palpate.scenes.laboratory.linear import LinearProblem
+from palpate.scenes.laboratory.mesh import QuadraticMesh, graded_mesh, surface_key
+from palpate.scenes.laboratory.solid import Material, Solid
+from palpate.scenes.laboratory.solver import Problem
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.phantoms import Phantom
 
 VERSION = 6
 """Raised whenever solved curves would change."""

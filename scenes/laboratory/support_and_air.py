@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.laboratory.hand import band_noise, minimum_jerk
-from scenes.laboratory.tracing import RATE_HZ
+from palpate.scenes.laboratory.hand import band_noise, minimum_jerk
+from palpate.scenes.laboratory.tracing import RATE_HZ
 
 RIGID_N = 4.0
 """Greatest force of a press on the bare support."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.laboratory.contact import Grip, SphereContact
+from palpate.scenes.laboratory.contact import Grip, SphereContact
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
-from scenes.laboratory.surface import Surface
-from scenes.phantoms import Phantom
+from palpate.scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.phantoms import Phantom
 
 RATE_HZ = 1000.0
 

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.presses.gap_bins import gap_by_bin
-from mechanics.presses.table import HOLDING, LOADING, OUTSIDE, UNLOADING
-from scenes.laboratory.effects import Readings, effect
-from scenes.laboratory.force import elastic_force
-from scenes.laboratory.motion import Motion
-from scenes.laboratory.paths import SIDEWAYS, WAY_OUT
-from scenes.laboratory.tracing import RATE_HZ
+from palpate.mechanics.presses.gap_bins import gap_by_bin
+from palpate.mechanics.presses.table import HOLDING, LOADING, OUTSIDE, UNLOADING
+from palpate.scenes.laboratory.effects import Readings, effect
+from palpate.scenes.laboratory.force import elastic_force
+from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_OUT
+from palpate.scenes.laboratory.tracing import RATE_HZ
 
 if TYPE_CHECKING:
-    from scenes.laboratory.session import Session
+    from palpate.scenes.laboratory.session import Session
 
 
 def truth_of(

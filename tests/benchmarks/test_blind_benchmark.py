@@ -10,7 +10,7 @@ import pytest
 from benchmarks._diagnosis_blind import tasks_of, unfinished
 from benchmarks._diagnosis_cases import ALIKE, FINITE, HIDDEN, SEEDS, WEIGHT, Case, cases
 from benchmarks._diagnosis_scores import answer_of, discovered, summarise
-from mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError
 from palpate.parallel.graph import Graph
 
 KNOWN = {"quick": 8, "medium": 250, "full": 640}

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.evidence import Evidence, Figure, measured, processor, read, write
-from mechanics.errors import FileError
+from palpate.mechanics.errors import FileError
 
 CLONE = Path(__file__).resolve().parents[2]
 KEPT = sorted((CLONE / "docs" / "evidence").glob("*.json"))

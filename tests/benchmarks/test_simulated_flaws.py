@@ -7,7 +7,7 @@ from benchmarks._adapter_flaws import CONTROLS, LAYOUT, POISSON, Parameters, dra
 from benchmarks._simulated_flaws import FLAWS, MODULUS_PA, RADIUS_M, Block, Given, simulated
 from benchmarks._simulated_scores import new_in
 from benchmarks.simulated import _verdict, _world
-from diagnose.other_simulator.forces import Forces
+from palpate.diagnosis.other_simulator.forces import Forces
 
 
 def test_two_wrong_parameters_are_both_given():

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import reconstruct
 from benchmarks.varied.draws import ORIENTATIONS, RATES_HZ, TRACINGS, draw
 from benchmarks.varied.instrument import logged, sampling_times, weighed
 from benchmarks.varied.objects import DEEPEST_MM, POOL, Thing, thickness, thing
@@ -17,9 +16,10 @@ from benchmarks.varied.recorded import frame, hand, record, touches
 from benchmarks.varied.shapes import CONCAVE, FAMILIES, SLENDER, shape
 from benchmarks.varied.writing import write
 from benchmarks.variety import REMEDIES
-from mechanics.recording.recording import read_recording
-from scenes.laboratory.effects import Readings
-from scenes.laboratory.frame import axes_of
+from palpate import reconstruction
+from palpate.mechanics.recording.recording import read_recording
+from palpate.scenes.laboratory.effects import Readings
+from palpate.scenes.laboratory.frame import axes_of
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +176,7 @@ def test_nuisances_leave_the_truth_as_it_is(tmp_path):
 
 def test_a_remedy_changes_how_an_object_is_explored_and_nothing_of_the_object(draws):
     """Modulus, object, frame and hand stay; and the refusals of reconstruct do speak of every remedy."""
-    texts = [p.read_text(encoding="utf-8") for p in Path(reconstruct.__file__).parent.rglob("*.py")]
+    texts = [p.read_text(encoding="utf-8") for p in Path(reconstruction.__path__[0]).rglob("*.py")]
     told = re.sub(r'"\s*f?"', "", "".join(texts))
     for words, mended in REMEDIES.items():
         assert words in told

@@ -1,6 +1,6 @@
 """The walk of a reader through files: what is a return to a room, and what a traced call is counted as."""
 
-import mechanics.names
+import palpate.mechanics.names
 from tools.walk import Walk, returns, stretches
 
 FILES = ["a/one.py", "a/two.py", "b/one.py", "a/three.py", "c/one.py", "b/two.py", "a/four.py"]
@@ -13,6 +13,6 @@ def test_a_return_is_another_file_of_a_room_that_was_left():
 
 def test_a_file_is_entered_once_by_its_first_call():
     with Walk() as walk:
-        mechanics.names.unknown("on", "word", ["one", "two"])
-        mechanics.names.unknown("to", "word", ["one", "two"])
+        palpate.mechanics.names.unknown("on", "word", ["one", "two"])
+        palpate.mechanics.names.unknown("to", "word", ["one", "two"])
     assert list(walk.files) == ["mechanics/names.py"] and walk.files["mechanics/names.py"] == "unknown"

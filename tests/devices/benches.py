@@ -12,18 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devices.base import PositionSource
-from devices.forcedimension import ForceDimensionOptions
-from devices.forcedimension import make as make_forcedimension
-from devices.haply import HaplyOptions
-from devices.haply import make as make_haply
-from devices.io_thread import ThreadedDevice
-from devices.openhaptics import OpenHapticsOptions
-from devices.openhaptics import make as make_openhaptics
-from devices.pid_ffb import PidOptions
-from devices.pid_ffb import make as make_pid
-from devices.spacemouse import make as make_spacemouse
-from devices.virtual_hand import SimulatedHand
+from palpate.devices.base import PositionSource
+from palpate.devices.forcedimension import ForceDimensionOptions
+from palpate.devices.forcedimension import make as make_forcedimension
+from palpate.devices.haply import HaplyOptions
+from palpate.devices.haply import make as make_haply
+from palpate.devices.io_thread import ThreadedDevice
+from palpate.devices.openhaptics import OpenHapticsOptions
+from palpate.devices.openhaptics import make as make_openhaptics
+from palpate.devices.pid_ffb import PidOptions
+from palpate.devices.pid_ffb import make as make_pid
+from palpate.devices.spacemouse import make as make_spacemouse
+from palpate.devices.virtual_hand import SimulatedHand
 
 from ..support.waiting import eventually
 from .fake_hid import OTHER_IDS, FakeHid, SpaceMouseUnit, StickUnit

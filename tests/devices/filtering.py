@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from devices.base import DeviceSpec, finite_vector
-from devices.safety import (
+from palpate.devices.base import DeviceSpec, finite_vector
+from palpate.devices.safety import (
     Reading,
     SafetyOptions,
     reason_words,

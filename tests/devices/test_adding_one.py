@@ -9,12 +9,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from devices import virtual_hand as simulated
-from devices.base import Availability
-from devices.registry import DEVICES, DeviceChoice, find_devices, options_of, spec_of
-from devices.virtual_hand import SimulatedHand
-from mechanics.options import option
 from palpate.cli import main
+from palpate.devices import virtual_hand as simulated
+from palpate.devices.base import Availability
+from palpate.devices.registry import DEVICES, DeviceChoice, find_devices, options_of, spec_of
+from palpate.devices.virtual_hand import SimulatedHand
+from palpate.mechanics.options import option
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class PlungerOptions:
 
 def _module() -> ModuleType:
     """What `devices/plunger.py` would hold."""
-    module = ModuleType("devices.plunger")
+    module = ModuleType("palpate.devices.plunger")
     module.SPEC = replace(simulated.SPEC, name="plunger", title="plunger on a desk")
 
     class Plunger(SimulatedHand):
@@ -41,8 +41,8 @@ def _module() -> ModuleType:
 
 
 def test_a_device_is_added_in_one_file_and_one_line(monkeypatch: pytest.MonkeyPatch, capsys):
-    monkeypatch.setitem(sys.modules, "devices.plunger", _module())
-    monkeypatch.setitem(DEVICES, "plunger", ("devices.plunger", "Plunger", "PlungerOptions"))
+    monkeypatch.setitem(sys.modules, "palpate.devices.plunger", _module())
+    monkeypatch.setitem(DEVICES, "plunger", ("palpate.devices.plunger", "Plunger", "PlungerOptions"))
     assert spec_of("plunger").title == "plunger on a desk" and options_of("plunger") is PlungerOptions
     assert [found.where for found in find_devices(["plunger"])] == ["on the desk"]
     device = DeviceChoice("plunger", {"options": PlungerOptions(rise_m=0.03)}).make()

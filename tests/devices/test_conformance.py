@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devices.base import DeviceSpec, ForceSink, PositionSource, host_clock
-from devices.safety import Reading, SafetyOptions
-from mechanics.errors import DeviceError
+from palpate.devices.base import DeviceSpec, ForceSink, PositionSource, host_clock
+from palpate.devices.safety import Reading, SafetyOptions
+from palpate.mechanics.errors import DeviceError
 
 from ..support.waiting import PATIENCE_S
 from .benches import FORCEFUL, MAKERS, Bench, eventually
@@ -268,7 +268,7 @@ def test_force_is_zeroed_when_the_program_just_ends() -> None:
         import numpy as np
         sys.path.insert(0, sys.argv[1])
         from fake_hid import FakeHid, StickUnit
-        from devices.pid_ffb import make
+        from palpate.devices.pid_ffb import make
         unit = StickUnit()
         device = make(hid=FakeHid(unit))
         device.open()

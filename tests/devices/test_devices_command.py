@@ -7,9 +7,9 @@ import json
 
 import pytest
 
-from devices.haply import HaplyOptions
-from devices.registry import DEVICES, options_of
 from palpate.cli import main
+from palpate.devices.haply import HaplyOptions
+from palpate.devices.registry import DEVICES, options_of
 from palpate.operations._declare import Call
 from palpate.operations._run import parser_of
 from palpate.operations.touch import TouchOperands, device_choice

@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from devices import mapper
-from devices.codecs import haply as codec
-from devices.haply import SPEC, HaplyOptions, find
-from devices.haply import make as make_haply
-from mechanics.errors import DeviceError
+from palpate.devices import mapper
+from palpate.devices.codecs import haply as codec
+from palpate.devices.haply import SPEC, HaplyOptions, find
+from palpate.devices.haply import make as make_haply
+from palpate.mechanics.errors import DeviceError
 
 from .benches import HaplyBench, eventually
 from .fake_inverse import Chain, FakeInverse

@@ -9,9 +9,9 @@ import types
 import numpy as np
 import pytest
 
-from devices import hid_port, pid_ffb, spacemouse
-from devices.io_thread import ZERO
-from mechanics.errors import DeviceError
+from palpate.devices import hid_port, pid_ffb, spacemouse
+from palpate.devices.io_thread import ZERO
+from palpate.mechanics.errors import DeviceError
 
 from .benches import eventually
 from .fake_hid import OPENFFBOARD_IDS, FakeHid, SpaceMouseUnit, StickUnit

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from devices import mapper
-from devices.mapper import MapperOptions, Mapping
-from mechanics.errors import OptionError
-from mechanics.tip_state import TipState
+from palpate.devices import mapper
+from palpate.devices.mapper import MapperOptions, Mapping
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.tip_state import TipState
 
 
 def state(time_s: float, position=(0, 0, 0), velocity=(0, 0, 0), buttons: int = 0, **more) -> TipState:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devices.base import ForceSink
+from palpate.devices.base import ForceSink
 
 from .benches import MAKERS, eventually
 

@@ -7,10 +7,10 @@ import struct
 
 import pytest
 
-from devices.codecs import pid
-from devices.codecs.hid_descriptor import parse
-from devices.codecs.pid import PidLayout
-from mechanics.errors import DeviceError
+from palpate.devices.codecs import pid
+from palpate.devices.codecs.hid_descriptor import parse
+from palpate.devices.codecs.pid import PidLayout
+from palpate.mechanics.errors import DeviceError
 
 from .fake_hid import OPENFFBOARD_IDS, OTHER_IDS, stick_descriptor
 

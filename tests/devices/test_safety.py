@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from devices.base import DeviceSpec
-from devices.safety import Reading, SafetyOptions
-from mechanics.errors import OptionError
+from palpate.devices.base import DeviceSpec
+from palpate.devices.safety import Reading, SafetyOptions
+from palpate.mechanics.errors import OptionError
 
 from .filtering import SafetyFilter
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from devices.base import DeviceSpec
-from devices.safety import LATCHING, SILENT, Reading, SafetyOptions, safety_parameters, safety_step
-from mechanics.errors import DeviceError, OptionError
+from palpate.devices.base import DeviceSpec
+from palpate.devices.safety import LATCHING, SILENT, Reading, SafetyOptions, safety_parameters, safety_step
+from palpate.mechanics.errors import DeviceError, OptionError
 
 from .filtering import SafetyFilter
 from .test_safety import DT, PUSH, SPEC, Session

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from devices.codecs import spacemouse as codec
+from palpate.devices.codecs import spacemouse as codec
 
 REST = codec.Deflection()
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from devices import forcedimension, openhaptics
-from devices.pid_ffb import PidOptions, PidWire
-from mechanics.errors import DeviceError
+from palpate.devices import forcedimension, openhaptics
+from palpate.devices.pid_ffb import PidOptions, PidWire
+from palpate.mechanics.errors import DeviceError
 
 from .benches import VendorBench
 

@@ -8,16 +8,16 @@ import threading
 import numpy as np
 import pytest
 
-from devices.base import ForceSink, PositionSource
-from devices.channel import PoseChannel
-from devices.impedance import HandImpedance
-from devices.intention import FreeExploration, Path, minimum_jerk
-from devices.mouse import WINDOW_SILENT_S, MouseDevice
-from devices.registry import DEVICES, DeviceChoice, find_devices, make_device
-from devices.replay import ReplayDevice, ReplayOptions
-from devices.virtual_hand import SimulatedHand, SimulatedOptions
-from mechanics.errors import DeviceError
-from mechanics.recording.recording import Recording
+from palpate.devices.base import ForceSink, PositionSource
+from palpate.devices.channel import PoseChannel
+from palpate.devices.impedance import HandImpedance
+from palpate.devices.intention import FreeExploration, Path, minimum_jerk
+from palpate.devices.mouse import WINDOW_SILENT_S, MouseDevice
+from palpate.devices.registry import DEVICES, DeviceChoice, find_devices, make_device
+from palpate.devices.replay import ReplayDevice, ReplayOptions
+from palpate.devices.virtual_hand import SimulatedHand, SimulatedOptions
+from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.recording.recording import Recording
 
 STILL = SimulatedOptions(tremor_m=0.0)
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import touch_sites
-from mechanics.contact.touch import touch_force
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.cutting import FoundPresses, cut
-from mechanics.presses.table import Presses
-from mechanics.recording.recording import Recording
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.sites import touch_sites
+from palpate.mechanics.contact.touch import touch_force
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.cutting import FoundPresses, cut
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 MODULUS, NU, RADIUS, NOISE = 20e3, 0.49, 0.005, 0.01
 

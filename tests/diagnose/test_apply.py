@@ -9,19 +9,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import mechanics.compliance.surface_compliance as made
-from diagnose.apply import improvement, with_effects, with_replayed_modulus
-from mechanics.compliance.near_field import sharpening, surface_softness
-from mechanics.compliance.pressed_places import solve_places
-from mechanics.compliance.sites import SURFACE_EDGE_M, touch_solver
-from mechanics.compliance.surface_compliance import surface_compliance
-from mechanics.effects.inclusion import ball_of, first_order, solved_change
-from mechanics.effects.registry import effect
-from mechanics.frames import tangents
-from mechanics.model.files import read_model, write_model
-from mechanics.model.material import Ball
-from render.fem.renderer import FemRenderer
-from render.options import RenderOptions
+import palpate.mechanics.compliance.surface_compliance as made
+from palpate.diagnosis.apply import improvement, with_effects, with_replayed_modulus
+from palpate.mechanics.compliance.near_field import sharpening, surface_softness
+from palpate.mechanics.compliance.pressed_places import solve_places
+from palpate.mechanics.compliance.sites import SURFACE_EDGE_M, touch_solver
+from palpate.mechanics.compliance.surface_compliance import surface_compliance
+from palpate.mechanics.effects.inclusion import ball_of, first_order, solved_change
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.material import Ball
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
 
 UP = np.array([0.0, 0.0, 1.0])
 DEPTH = 0.004
@@ -245,9 +245,10 @@ def test_what_makes_the_replayed_force_worse_is_left_out(bench, model, monkeypat
     """A ball whose rendered force is farther off than the one without it is no improvement."""
     ball = {"centre_m": [0.012, 0.0, 0.026], "radius_m": 0.011, "modulus_ratio": 6.0}
     replayed = {True: gap_n, False: 0.05}
-    monkeypatch.setattr("diagnose.apply.with_replayed_modulus", lambda model, recording: model)
+    monkeypatch.setattr("palpate.diagnosis.apply.with_replayed_modulus", lambda model, recording: model)
     monkeypatch.setattr(
-        "diagnose.apply.replayed_gap_n", lambda model, recording: replayed["inclusion" in model.effects]
+        "palpate.diagnosis.apply.replayed_gap_n",
+        lambda model, recording: replayed["inclusion" in model.effects],
     )
     found = improvement(model, Named(model, ball), bench.record()[0])
     assert ("inclusion" in found.model.effects) == kept and "friction_slip" in found.model.effects

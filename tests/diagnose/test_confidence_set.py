@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnose.search.rivals import confidence_p
+from palpate.diagnosis.search.rivals import confidence_p
 
 
 def test_equal_explanations_stay_and_a_worse_one_goes() -> None:

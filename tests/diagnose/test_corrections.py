@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from diagnose.apply import corrected, unsure
-from mechanics.recording.recording import Recording
+from palpate.diagnosis.apply import corrected, unsure
+from palpate.mechanics.recording.recording import Recording
 
 
 def verdict(**intervals):

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.detectable import SEEN, detectable
-from diagnose.search.evidence import Search
-from diagnose.search.fit import settings_of
-from mechanics.effects.registry import effect
-from mechanics.model.model import Model
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.detectable import SEEN, detectable
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import settings_of
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.model.model import Model
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.search.fit import settings_of
-from mechanics.effects.base import DOMAINS, Role, Scope
-from mechanics.effects.registry import NAMES, effect, effects
-from mechanics.errors import OptionError
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.search.fit import settings_of
+from palpate.mechanics.effects.base import DOMAINS, Role, Scope
+from palpate.mechanics.effects.registry import NAMES, effect, effects
+from palpate.mechanics.errors import OptionError
 
 CONTRACT = {
     "viscoelasticity": {"g", "tau_s"},

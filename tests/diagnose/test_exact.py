@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import Forward, build_forward, solved
-from diagnose.forward.touches import touches_of
-from diagnose.options import DiagnoseOptions, NuisanceOptions
-from diagnose.pipeline import diagnose
-from diagnose.search.site_stiffness import site_stiffness_sd
-from diagnose.search.whiten import nuisance_columns
-from mechanics.contact.depth_factors import CONVERGENCE
-from mechanics.effects.finite_strain import EFFECT as STRAIN
-from mechanics.press_solver import solved_places
-from mechanics.press_solver.press import LAWS
+from palpate.diagnosis.forward.prediction import Forward, build_forward, solved
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.options import DiagnoseOptions, NuisanceOptions
+from palpate.diagnosis.pipeline import diagnose
+from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
+from palpate.diagnosis.search.whiten import nuisance_columns
+from palpate.mechanics.contact.depth_factors import CONVERGENCE
+from palpate.mechanics.effects.finite_strain import EFFECT as STRAIN
+from palpate.mechanics.press_solver import solved_places
+from palpate.mechanics.press_solver.press import LAWS
 
 STIFFER = 50.0
 """1/m, by how much of itself a solved force is above the law's as it goes deeper."""

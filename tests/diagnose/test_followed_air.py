@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import FOLLOWED, touches_of
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.evidence import Search
-from diagnose.search.whiten import Whitener
-from mechanics.effects.registry import effect
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import FOLLOWED, touches_of
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.effects.registry import effect
 
 
 def test_what_a_turning_tool_may_have_read_between_is_forgiven_as_far_as_its_ends_tell(bench):

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from diagnose.apply import corrected
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.instrument.free_air import free_air_of
-from diagnose.instrument.instrument_effects import find_instrument_offsets
-from diagnose.options import DiagnoseOptions
-from diagnose.pipeline import diagnose
-from reconstruct.steps.s3_contacts.contacts import explore
+from palpate.diagnosis.apply import corrected
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.instrument.free_air import free_air_of
+from palpate.diagnosis.instrument.instrument_effects import find_instrument_offsets
+from palpate.diagnosis.options import DiagnoseOptions
+from palpate.diagnosis.pipeline import diagnose
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
 from ..reconstruct.exploration_of_cylinder import explore_cylinder
 

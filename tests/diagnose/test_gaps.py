@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnose.search.gaps import closed_share_ci95, gap
+from palpate.diagnosis.search.gaps import closed_share_ci95, gap
 
 
 def test_the_share_is_that_of_the_excess_over_the_noise() -> None:

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.pipeline import diagnose
-from mechanics.recording.recording import read_recording
+from palpate.diagnosis.pipeline import diagnose
+from palpate.mechanics.recording.recording import read_recording
 
 EXPECTED = {
     "silicone-1-cylinder": "finite_strain",
@@ -24,7 +24,7 @@ EXPECTED = {
 @pytest.mark.parametrize("name", EXPECTED)
 def test_labelled(shared_recordings, name):
     """With the tracing to be found; where it is stated, the object is the same."""
-    from reconstruct.pipeline import ReconstructOptions, reconstruct
+    from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct
 
     stated = read_recording(shared_recordings / f"{name}.toml")
     left_out = dataclasses.replace(stated, boundary_phase=None)

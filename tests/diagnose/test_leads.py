@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.recording.side_of_play import leads
+from palpate.mechanics.recording.side_of_play import leads
 
 WIDTH = 0.25e-3
 

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.options import AttributionOptions
-from diagnose.search.attribution import _with_strain, _without_idle
-from diagnose.search.evidence import Search
-from diagnose.search.gaps import lower_closure
-from diagnose.search.naming import Score
-from mechanics.effects.registry import effect
+from palpate.diagnosis.options import AttributionOptions
+from palpate.diagnosis.search.attribution import _with_strain, _without_idle
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.gaps import lower_closure
+from palpate.diagnosis.search.naming import Score
+from palpate.mechanics.effects.registry import effect
 
 
 def score(name, per_group, closes=0.6, share=0.7):

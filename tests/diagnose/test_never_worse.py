@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.verdict.answer import Answer
-from diagnose.verdict.held_out import Gaps, never_worse, without_what_makes_it_worse
+from palpate.diagnosis.verdict.answer import Answer
+from palpate.diagnosis.verdict.held_out import Gaps, never_worse, without_what_makes_it_worse
 
 COUNTS = np.full(20, 100.0)
 BEFORE = np.random.default_rng(0).uniform(8.0, 12.0, 20)

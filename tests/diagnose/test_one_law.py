@@ -13,19 +13,19 @@ from functools import partial
 import numpy as np
 import pytest
 
-import mechanics.compliance.surface_compliance as made
-from diagnose.apply import with_effects
-from diagnose.forward.prediction import Forward
-from mechanics.compliance.far_field import energy_fields, far_with_weights
-from mechanics.compliance.near_field import surface_softness
-from mechanics.compliance.pressed_places import solve_places
-from mechanics.compliance.sites import touch_solver
-from mechanics.compliance.stored_compliance import load_or_condense
-from mechanics.effects.registry import effect, effects
-from mechanics.frames import tangents
-from mechanics.presses.making import of_paths
-from render.fem.renderer import FemRenderer
-from render.options import RenderOptions
+import palpate.mechanics.compliance.surface_compliance as made
+from palpate.diagnosis.apply import with_effects
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
+from palpate.mechanics.compliance.near_field import surface_softness
+from palpate.mechanics.compliance.pressed_places import solve_places
+from palpate.mechanics.compliance.sites import touch_solver
+from palpate.mechanics.compliance.stored_compliance import load_or_condense
+from palpate.mechanics.effects.registry import effect, effects
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.presses.making import of_paths
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
 
 COARSE_M = 0.05
 POINT, UP = np.array([0.012, 0.006, 0.04]), np.array([0.0, 0.0, 1.0])

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.presses.making import of_paths
-from mechanics.presses.table import HOLDING, LOADING, UNLOADING
+from palpate.mechanics.presses.making import of_paths
+from palpate.mechanics.presses.table import HOLDING, LOADING, UNLOADING
 
 
 def test_a_press_has_a_deepest_part_even_where_it_never_reaches_the_surface():

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.instrument.instrument_effects import seen_play
-from diagnose.instrument.support_readings import Rigid
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.attribution import Attribution, attribute
-from diagnose.search.evidence import Search
-from diagnose.search.fewer import fewer
-from diagnose.search.fit import settings_of
-from diagnose.search.whiten import Whitener
-from mechanics.effects.base import Effect
-from mechanics.effects.registry import effect
-from mechanics.recording.side_of_play import leads, play, sides
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.instrument.instrument_effects import seen_play
+from palpate.diagnosis.instrument.support_readings import Rigid
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.attribution import Attribution, attribute
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fewer import fewer
+from palpate.diagnosis.search.fit import settings_of
+from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.recording.side_of_play import leads, play, sides
 
 WIDTH = 0.4e-3
 TRIED = ("viscoelasticity", "time_delay", "mullins_softening", "backlash")

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.diagnose_real import FOLDERS, SETS, _row
 from benchmarks.tissue_laws import pieces_of
-from mechanics.effects.registry import effect
+from palpate.mechanics.effects.registry import effect
 
 
 def rows(measured_data, name: str, **options):

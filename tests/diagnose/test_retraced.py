@@ -9,16 +9,16 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.instrument.instrument_effects import InstrumentOffsets, ruled_out, with_move
-from diagnose.instrument.retraced import Move, move_of
-from diagnose.instrument.support_readings import Rigid
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.evidence import Search
-from diagnose.verdict.next_touch import next_touch
-from mechanics.effects.registry import effect
-from mechanics.recording.recording import Recording
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.instrument.instrument_effects import InstrumentOffsets, ruled_out, with_move
+from palpate.diagnosis.instrument.retraced import Move, move_of
+from palpate.diagnosis.instrument.support_readings import Rigid
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.verdict.next_touch import next_touch
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.recording.recording import Recording
 
 UP = np.array([0.15, -0.1, 0.98]) / np.linalg.norm([0.15, -0.1, 0.98])
 CENTRE = np.array([0.3, -0.2, 0.1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.specimen.bench import Similarity
+from palpate.diagnosis.specimen.bench import Similarity
 
 L, F, T = 50.0, 3e4, 0.25
 """Factors from the machine's metres, newtons and seconds to a hand's."""

@@ -7,31 +7,37 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.numerics.base import Signal, signal_of
-from diagnose.numerics.contact_stiffness import layer_factors
-from diagnose.numerics.lost_contact import lost
-from diagnose.numerics.registry import NAMES, numericals
-from diagnose.options import DiagnoseOptions
-from diagnose.other_simulator.advice import parameter_words
-from diagnose.other_simulator.against_law import seen_in_samples
-from diagnose.other_simulator.forces import Forces, ForcesOptions, aligned, read_forces, sorted_forces
-from diagnose.other_simulator.parts import Parameter
-from diagnose.other_simulator.pipeline import Asked, diagnose_simulated
-from diagnose.other_simulator.presses_to_run import spread_out
-from diagnose.other_simulator.result import PARTS, Mended
-from diagnose.other_simulator.stated import StatedForward, stated_of
-from diagnose.pipeline import diagnose
-from mechanics.contact.dent import grid
-from mechanics.effects.registry import NAMES as PHYSICAL
-from mechanics.errors import OptionError, RecordingError
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.table import LEAD_S
-from mechanics.progress import silent
-from mechanics.shape.box_mesh import box_mesh
+from palpate.diagnosis.numerics.base import Signal, signal_of
+from palpate.diagnosis.numerics.contact_stiffness import layer_factors
+from palpate.diagnosis.numerics.lost_contact import lost
+from palpate.diagnosis.numerics.registry import NAMES, numericals
+from palpate.diagnosis.options import DiagnoseOptions
+from palpate.diagnosis.other_simulator.advice import parameter_words
+from palpate.diagnosis.other_simulator.against_law import seen_in_samples
+from palpate.diagnosis.other_simulator.forces import (
+    Forces,
+    ForcesOptions,
+    aligned,
+    read_forces,
+    sorted_forces,
+)
+from palpate.diagnosis.other_simulator.parts import Parameter
+from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
+from palpate.diagnosis.other_simulator.presses_to_run import spread_out
+from palpate.diagnosis.other_simulator.result import PARTS, Mended
+from palpate.diagnosis.other_simulator.stated import StatedForward, stated_of
+from palpate.diagnosis.pipeline import diagnose
+from palpate.mechanics.contact.dent import grid
+from palpate.mechanics.effects.registry import NAMES as PHYSICAL
+from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.table import LEAD_S
+from palpate.mechanics.progress import silent
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.render.registry import create
+from palpate.render.replay import replay
 from palpate.show.other_simulator import lead
-from render.registry import create
-from render.replay import replay
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from mechanics.compliance.far_field import _sampler, _unit_loads, energy_fields
-from mechanics.compliance.field_response import far_of, shares_in_elements
-from mechanics.effects.registry import effect
-from mechanics.elastic.solver import Solver
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.mechanics.compliance.far_field import _sampler, _unit_loads, energy_fields
+from palpate.mechanics.compliance.field_response import far_of, shares_in_elements
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.elastic.solver import Solver
 
 FIELD = effect("stiffness_field")
 MODULUS = 20e3
@@ -104,7 +104,7 @@ def test_what_is_applied_is_what_was_fitted(forward):
 def test_written_and_read_back_the_field_is_there(forward, tmp_path):
     import pyvista
 
-    from mechanics.model.files import read_model, write_model
+    from palpate.mechanics.model.files import read_model, write_model
 
     values = np.zeros(len(FIELD.parameters))
     values[0] = 1.0

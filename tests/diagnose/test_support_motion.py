@@ -7,22 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from mechanics.compliance import support_motion as support
-from mechanics.compliance.far_field import energy_fields
-from mechanics.compliance.patch import PatchSampler
-from mechanics.compliance.support_motion import (
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.mechanics.compliance import support_motion as support
+from palpate.mechanics.compliance.far_field import energy_fields
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.compliance.support_motion import (
     far_on_springs,
     far_partly_bonded,
     few_corners,
     loosened,
     support_motion,
 )
-from mechanics.elastic.held_base import BaseHold
-from mechanics.elastic.solver import Solver
-from mechanics.frames import tangents
-from mechanics.shape.refine import typical_edge
+from palpate.mechanics.elastic.held_base import BaseHold
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.shape.refine import typical_edge
 
 
 @pytest.fixture(scope="module")

@@ -8,21 +8,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.instrument.instrument_effects import (
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.instrument.instrument_effects import (
     find_instrument_offsets,
     read_sideways,
     ruled_out,
     seen_play,
 )
-from diagnose.instrument.support_readings import Rigid, rigid_of
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.attribution import attribute
-from diagnose.search.evidence import Search
-from mechanics.effects.registry import effect
-from mechanics.frames import tangents
-from mechanics.recording.recording import Recording
+from palpate.diagnosis.instrument.support_readings import Rigid, rigid_of
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.attribution import attribute
+from palpate.diagnosis.search.evidence import Search
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.recording.recording import Recording
 
 NORMAL = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from diagnose.verdict import corrections as module
-from diagnose.verdict.corrections import (
+from palpate.diagnosis.verdict import corrections as module
+from palpate.diagnosis.verdict.corrections import (
     ALONE,
     BOTH,
     CANDIDATE,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.attribution import _best_law
-from diagnose.search.evidence import Search
-from diagnose.search.rivals import of_one_phenomenon
-from mechanics.effects.registry import effect, effects
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.attribution import _best_law
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.rivals import of_one_phenomenon
+from palpate.mechanics.effects.registry import effect, effects
 
 RADIUS, SHARE, DIFFUSIVITY = 0.005, 0.4, 4e-5
 

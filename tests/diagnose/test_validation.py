@@ -8,18 +8,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.descent import Descent, fit
-from diagnose.search.evidence import Search
-from diagnose.search.intervals import covariance, parameter_intervals
-from diagnose.search.leave_one_out import Candidate, held_out
-from diagnose.search.naming import Score
-from diagnose.search.site_stiffness import repeat_scatter
-from diagnose.verdict.held_out import deepest, held_out_by_refit, neighbours
-from mechanics.effects.registry import effect
-from mechanics.effects.time_delay import EFFECT as DELAY
+from palpate.diagnosis.forward.prediction import build_forward
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
+from palpate.diagnosis.search.descent import Descent, fit
+from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.intervals import covariance, parameter_intervals
+from palpate.diagnosis.search.leave_one_out import Candidate, held_out
+from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.site_stiffness import repeat_scatter
+from palpate.diagnosis.verdict.held_out import deepest, held_out_by_refit, neighbours
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.effects.time_delay import EFFECT as DELAY
 
 MODULUS = 20e3
 

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from diagnose.apply import corrected, improved
-from diagnose.forward.prediction import Forward
-from diagnose.options import DiagnoseOptions, NuisanceOptions
-from diagnose.pipeline import diagnose
-from diagnose.verdict.answer import answer_of
-from diagnose.verdict.held_out import held_out_by_refit
-from diagnose.verdict.next_touch import next_touch
-from mechanics.model.files import read_model, write_model
-from mechanics.presses.gap_bins import gap_by_bin
+from palpate.diagnosis.apply import corrected, improved
+from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.options import DiagnoseOptions, NuisanceOptions
+from palpate.diagnosis.pipeline import diagnose
+from palpate.diagnosis.verdict.answer import answer_of
+from palpate.diagnosis.verdict.held_out import held_out_by_refit
+from palpate.diagnosis.verdict.next_touch import next_touch
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.presses.gap_bins import gap_by_bin
+from palpate.reconstruction.presses_on_model import presses_on
 from palpate.show.demo import diagnosis_json, diagnosis_words
 from palpate.show.diagnosis.words import spoken, verdict
-from reconstruct.presses_on_model import presses_on
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
 
@@ -238,7 +238,7 @@ def test_what_makes_the_held_out_gap_grow_is_a_candidate_and_never_named(bench, 
         worse = 4.0 if "time_delay" in found.names else 1.0
         return dataclasses.replace(honest, plain=worse * honest.plain + (worse - 1.0))
 
-    monkeypatch.setattr("diagnose.verdict.held_out.held_out_by_refit", grown)
+    monkeypatch.setattr("palpate.diagnosis.verdict.held_out.held_out_by_refit", grown)
     costly = "poisson_ratio,unbonded_base,compliant_base,inclusion,skin_layer,modulus_gradient"
     options = dataclasses.replace(FAST, fast=False, without=costly)
     result = diagnose(*bench.record(_late), options)
@@ -250,7 +250,7 @@ def test_what_makes_the_held_out_gap_grow_is_a_candidate_and_never_named(bench, 
 @pytest.mark.parametrize(("closes", "named"), [(1e-3, True), (-1e-3, False)])
 def test_finite_strain_is_named_only_where_it_predicts_better(nameless, monkeypatch, closes, named):
     """However much likelier it makes presses that it was fitted to."""
-    monkeypatch.setattr("diagnose.verdict.answer.finite_strain_size", lambda *_: 0.1)
+    monkeypatch.setattr("palpate.diagnosis.verdict.answer.finite_strain_size", lambda *_: 0.1)
     findings = nameless.findings
     found = dataclasses.replace(findings.found, finite_strain_gain=30.0, finite_strain_closes=closes)
     answer = answer_of(dataclasses.replace(findings, found=found), findings.search.whitener.counts())

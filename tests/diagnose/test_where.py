@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from diagnose.verdict.where import family_wise
+from palpate.diagnosis.verdict.where import family_wise
 
 NAMES = ("depth", "rate", "phase", "direction", "order", "repeat")
 NULLS = 500

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.verdict import corrections
-from diagnose.verdict.corrections import factors, widened
+from palpate.diagnosis.verdict import corrections
+from palpate.diagnosis.verdict.corrections import factors, widened
 from tools.diagnose_widening import chosen_factors, distances
 
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.palpate.importing.test_meaning import press, write
 
 import palpate as pp
 from palpate import cli
-from tests.palpate.importing.test_meaning import press, write
 from tests.support.waiting import eventually
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -78,28 +78,28 @@ WIDELY = {"material": ["--fast", "--travel", "out"]}
 """What is said beside, so that a stand-in costs little: fewer effects."""
 ELSEWHERE = {
     "palpate demo": ".ci/run",
-    "palpate batch": "tests/palpate/batch/test_batch_recordings.py",
+    "palpate batch": "tests/shell/batch/test_batch_recordings.py",
     "palpate calibrate": "tests/reconstruct/test_calibration.py",
-    "palpate check REC --full": "tests/palpate/test_check_command.py",
+    "palpate check REC --full": "tests/shell/test_check_command.py",
     "palpate compare": "tests/diagnose/compare",
     "palpate devices --measure": "tests/devices/test_devices_command.py",
     "palpate diagnose": "examples/plot_05_a_slow_sensor.py",
     "palpate explore": "tests/diagnose/explore",
-    "palpate import bag_folder": "tests/palpate/importing/test_import.py",
-    "palpate import palpation.csv": "tests/palpate/importing/test_import.py",
+    "palpate import bag_folder": "tests/shell/importing/test_import.py",
+    "palpate import palpation.csv": "tests/shell/importing/test_import.py",
     "palpate material FILE...": "tests/diagnose/specimen",
-    "palpate material dent.xlsx": "tests/palpate/importing/test_sheets.py",
-    "palpate open FILE...": "tests/palpate/operations/test_open.py",
+    "palpate material dent.xlsx": "tests/shell/importing/test_sheets.py",
+    "palpate open FILE...": "tests/shell/operations/test_open.py",
     "palpate open palpation.csv": "tests/reconstruct/test_sliding_on_a_slab.py",
     "palpate reconstruct": "tests/reconstruct/test_command.py",
     "palpate simulate": "tests/scenes/laboratory",
-    "palpate touch": "tests/palpate/window/test_touch_command.py",
-    "eval": "tests/palpate/test_help.py",
+    "palpate touch": "tests/shell/window/test_touch_command.py",
+    "eval": "tests/shell/test_help.py",
     "howto/batch.md python": "examples/plot_13_a_batch.py",
     "howto/cad-or-scan.md python": "examples/plot_10_your_own_mesh.py",
-    "howto/force-test.md python": "tests/palpate/operations/test_results.py",
+    "howto/force-test.md python": "tests/shell/operations/test_results.py",
     "howto/guided-exploration.md python": "tests/diagnose/explore",
-    "howto/python.md python": "tests/palpate/operations/test_snippets.py",
+    "howto/python.md python": "tests/shell/operations/test_snippets.py",
     "howto/write-an-effect.md python": "examples/plot_11_write_an_effect.py",
     "howto/wrong-simulation.md python": "tests/diagnose/test_simulated.py",
 }
@@ -169,7 +169,7 @@ PAGES_OF_CODE = {"howto/write-a-device.md"}
 def test_the_device_of_its_page_gives_a_position_and_takes_a_force(monkeypatch):
     from types import ModuleType
 
-    module = ModuleType("devices.handle")
+    module = ModuleType("palpate.devices.handle")
     monkeypatch.setitem(sys.modules, module.__name__, module)
     exec(compile(code_of(DOCS / "howto" / "write-a-device.md")[0], "handle.py", "exec"), module.__dict__)
     assert [each.present for each in module.find()] == [True]
@@ -187,7 +187,7 @@ def test_the_device_of_its_page_gives_a_position_and_takes_a_force(monkeypatch):
 def test_the_bench_of_that_page_moves_feels_and_unplugs(monkeypatch):
     from types import ModuleType
 
-    module = ModuleType("devices.handle")
+    module = ModuleType("palpate.devices.handle")
     monkeypatch.setitem(sys.modules, module.__name__, module)
     driver, bench = code_of(DOCS / "howto" / "write-a-device.md")
     exec(compile(driver, "handle.py", "exec"), module.__dict__)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import os
 import re
 import shlex
 import subprocess
@@ -15,7 +16,6 @@ from pathlib import Path
 import pytest
 
 import palpate as pp
-from palpate.child import module_environment
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(REPOSITORY / "docs"))
@@ -125,6 +125,6 @@ def test_marked_blocks_run(code, tmp_path):
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        env=module_environment(MPLBACKEND="Agg"),
+        env=dict(os.environ, MPLBACKEND="Agg"),
     )
     assert done.returncode == 0, done.stderr

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mechanics.effects.registry import NAMES
+from palpate.mechanics.effects.registry import NAMES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(REPOSITORY / "docs"))

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 
 @pytest.fixture(scope="session")

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from benchmarks._condensation import condense
-from mechanics.compliance.sites import LoadPatch, touch_sites
-from mechanics.compliance.stored_compliance import ComplianceOptions
-from mechanics.compliance.surface_compliance import patch_blocks, surface_compliance
-from mechanics.elastic.pardiso import available
-from mechanics.elastic.solver import Solver
-from mechanics.errors import MeshError, OptionError
-from mechanics.shape.nearest import closest
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.sites import LoadPatch, touch_sites
+from palpate.mechanics.compliance.stored_compliance import ComplianceOptions
+from palpate.mechanics.compliance.surface_compliance import patch_blocks, surface_compliance
+from palpate.mechanics.elastic.pardiso import available
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import MeshError, OptionError
+from palpate.mechanics.shape.nearest import closest
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 WAYS = [("columns", "superlu", 0)]
 if available():  # schur: all at once for a small result, in two parts for a large one

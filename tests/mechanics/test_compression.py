@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compliance.compression import between_mixed, compress, mix_factor
-from mechanics.compliance.patch import PatchSampler
-from mechanics.elastic.solver import Solver
-from mechanics.errors import MeshError
+from palpate.mechanics.compliance.compression import between_mixed, compress, mix_factor
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import MeshError
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.contact.dent import dent_force, dent_law, dent_laws, effective_radius, grid
-from mechanics.errors import OptionError
+from palpate.mechanics.contact.dent import dent_force, dent_law, dent_laws, effective_radius, grid
+from palpate.mechanics.errors import OptionError
 
 from .closed_forms import (
     bonded_punch_sideways_force,

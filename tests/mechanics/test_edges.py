@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.contact.edges import edge_law
-from mechanics.contact.touch import forces_at
-from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.shape.tetmesh import TetMesh
-from mechanics.shape.true_shape import TrueShape
+from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.press_solver.press import PressOptions, PressSolver
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.true_shape import TrueShape
 
 SIZE_M = (0.08, 0.08, 0.04)
 UP, OUT = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -24,7 +24,7 @@ HALF_SPACE = (1 - 0.49**2) / (2 * np.sqrt(np.pi) * 0.004)
 @pytest.fixture(scope="module")
 def block() -> TetMesh:
     """A block whose shape is known, standing on its fixed base."""
-    from mechanics.shape.box_mesh import box_mesh
+    from palpate.mechanics.shape.box_mesh import box_mesh
 
     mesh = box_mesh((8, 8, 4), SIZE_M)
     shell = trimesh.creation.box(SIZE_M)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.effects.jkr_adhesion import _set as set_adhesion
-from mechanics.effects.jkr_adhesion import edge_share
-from mechanics.effects.law import Law
-from mechanics.effects.poroelasticity import LAW as POROELASTIC
-from mechanics.effects.power_law_relaxation import LONGEST_S, SHORTEST_S, prony_terms
-from mechanics.effects.settings import Touch
-from mechanics.effects.viscoelasticity import LAW as PRONY
+from palpate.mechanics.effects.jkr_adhesion import _set as set_adhesion
+from palpate.mechanics.effects.jkr_adhesion import edge_share
+from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.poroelasticity import LAW as POROELASTIC
+from palpate.mechanics.effects.power_law_relaxation import LONGEST_S, SHORTEST_S, prony_terms
+from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.viscoelasticity import LAW as PRONY
 
 NORMAL = np.array([0.0, 0.0, 1.0])
 

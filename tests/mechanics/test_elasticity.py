@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
 
-from mechanics.compliance.patch import PatchSampler
-from mechanics.elastic.elasticity import element_stiffness, lame_parameters, stiffness, strain
-from mechanics.elastic.pardiso import available
-from mechanics.elastic.solver import Solver
-from mechanics.errors import MeshError
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.elastic.elasticity import element_stiffness, lame_parameters, stiffness, strain
+from palpate.mechanics.elastic.pardiso import available
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import MeshError
 
 from ..support.elements import compliance, mixed_compliance
 from .closed_forms import uniaxial_strain_of_stress, volume_strain_of_pressure
@@ -140,7 +140,7 @@ def mass_times(mesh, body):
                 if mesh.order == 1:
                     shape = bary
                 else:
-                    from mechanics.shape.tetmesh import EDGES
+                    from palpate.mechanics.shape.tetmesh import EDGES
 
                     shape = np.concatenate([bary * (2 * bary - 1), 4 * bary[EDGES[:, 0]] * bary[EDGES[:, 1]]])
                 value = np.einsum("i,mix->mx", shape, body[mesh.tetrahedra])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mechanics.elastic.elasticity import stiffness
-from mechanics.elastic.pardiso import Pardiso, available
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.elastic.elasticity import stiffness
+from palpate.mechanics.elastic.pardiso import Pardiso, available
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 from .closed_forms import boussinesq_displacement, flat_punch_force
 

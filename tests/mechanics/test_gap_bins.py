@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.presses.gap_bins import gap_by_bin
-from mechanics.presses.table import HOLDING, LOADING, OUTSIDE, UNLOADING
+from palpate.mechanics.presses.gap_bins import gap_by_bin
+from palpate.mechanics.presses.table import HOLDING, LOADING, OUTSIDE, UNLOADING
 
 
 def test_a_gap_at_the_deepest_while_held_at_the_end_is_in_those_bins_alone() -> None:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-import mechanics
+from palpate.mechanics.kernel_cache import sources
 
-ROOT = Path(mechanics.__file__).parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 ALONE = {"part", "inner", "fresh_part"}
 COMPILED = ALONE | {"kernel", "step_kernel", "loop_kernel", "shared_part", "njit"}
 
@@ -30,12 +30,13 @@ def python_calls(node: ast.AST) -> set[str]:
 @pytest.fixture(scope="module")
 def texts() -> dict[str, str]:
     """Dotted name -> source of everything that may call a kernel."""
-    folders = ("mechanics", "render", "devices", "diagnose", "palpate", "scenes", "benchmarks", "tests")
-    files = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
-    return {
-        ".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8")
-        for path in files
+    beside = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): path
+        for folder in ("benchmarks", "tests")
+        for path in (ROOT / folder).rglob("*.py")
     }
+    found = {**beside, **{name: Path(path) for name, path in sources().items()}}
+    return {name: path.read_text(encoding="utf-8") for name, path in found.items()}
 
 
 def those_with(texts: dict[str, str], pattern: str) -> dict[str, ast.Module]:
@@ -50,7 +51,7 @@ def test_python_calls_nothing_that_is_compiled_for_kernels_alone(texts):
         for node in ast.walk(tree)
         if isinstance(node, ast.FunctionDef) and decorators(node) & ALONE
     }
-    assert ("render.fem.stick_slip", "settle") in alone
+    assert ("palpate.render.fem.stick_slip", "settle") in alone
     wrong = []
     for module, tree in those_with(texts, rf"\b({'|'.join({name for _, name in alone})})\b").items():
         seen = {

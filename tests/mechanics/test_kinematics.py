@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mechanics.recording.kinematics import acceleration, velocity
+from palpate.mechanics.recording.kinematics import acceleration, velocity
 
 EVEN = np.arange(0, 1.0, 1e-3)
 

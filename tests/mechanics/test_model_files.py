@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.errors import FileError, MeshError, ModelError
-from mechanics.model.files import read_model, write_model
-from mechanics.model.material import Ball, Gradient, Material, Skin
-from mechanics.model.model import Model, Support, Tool
-from mechanics.model.moduli import MODULUS_LIMITS, inclusion_ratio, skin_ratio
-from mechanics.presses.making import of_places
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.errors import FileError, MeshError, ModelError
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.material import Ball, Gradient, Material, Skin
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.model.moduli import MODULUS_LIMITS, inclusion_ratio, skin_ratio
+from palpate.mechanics.presses.making import of_places
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 
 def cube() -> TetMesh:
@@ -73,7 +73,7 @@ def test_an_interrupted_write_leaves_the_old_model(tmp_path, monkeypatch):
     def broken(*_):
         raise OSError("disk full")
 
-    monkeypatch.setattr("mechanics.model.files.write_csv", broken)
+    monkeypatch.setattr("palpate.mechanics.model.files.write_csv", broken)
     with pytest.raises(OSError, match="disk full"):
         write_model(tmp_path / "m", model(2))
     assert read_model(tmp_path / "m").mesh.order == 1

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compliance.near_field import contact_width, sharpening
-from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.elastic.solver import Solver
-from mechanics.model.material import Ball
-from mechanics.model.moduli import balls_ratio, inclusion_ratio, mixed_ratio
-from mechanics.shape.refine import refined_around, refined_near_surface
+from palpate.mechanics.compliance.near_field import contact_width, sharpening
+from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.model.material import Ball
+from palpate.mechanics.model.moduli import balls_ratio, inclusion_ratio, mixed_ratio
+from palpate.mechanics.shape.refine import refined_around, refined_near_surface
 
 NU = 0.49
 TOP = np.array([[0.0, 0.0, 0.04], [0.035, 0.035, 0.04]])

@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from mechanics.shape.nearest import first_hits
+from palpate.mechanics.shape.nearest import first_hits
 
 
 def test_rays_meet_a_cube_where_they_must() -> None:

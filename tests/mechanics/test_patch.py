@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compliance.patch import PatchSampler, half_space_compliance
-from mechanics.compliance.sites import patch_compliance, patch_width
-from mechanics.elastic.elasticity import stiffness
-from mechanics.elastic.pardiso import Pardiso, available
-from mechanics.elastic.solver import Solver
-from mechanics.errors import MeshError
+from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance
+from palpate.mechanics.compliance.sites import patch_compliance, patch_width
+from palpate.mechanics.elastic.elasticity import stiffness
+from palpate.mechanics.elastic.pardiso import Pardiso, available
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import MeshError
 
 from .closed_forms import boussinesq_displacement, cerruti_displacement
 

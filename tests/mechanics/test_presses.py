@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.errors import ModelError
-from mechanics.model.files import read_presses, write_csv, write_presses
-from mechanics.presses.cutting import FoundAround, FoundPresses, cut, free_segments
-from mechanics.presses.making import of_places
-from mechanics.presses.repeats import sites_of
-from mechanics.presses.table import FITS
-from mechanics.recording.recording import Recording
+from palpate.mechanics.errors import ModelError
+from palpate.mechanics.model.files import read_presses, write_csv, write_presses
+from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut, free_segments
+from palpate.mechanics.presses.making import of_places
+from palpate.mechanics.presses.repeats import sites_of
+from palpate.mechanics.presses.table import FITS
+from palpate.mechanics.recording.recording import Recording
 
 UP = np.array([0.0, 0.0, 1.0])
 TIP, RATE, STIFF = 0.005, 1000.0, 300.0

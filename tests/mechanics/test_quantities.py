@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from mechanics.disk.schema import Key
-from mechanics.effects.registry import effects
-from mechanics.errors import OptionError
-from mechanics.model import files as model_files
-from mechanics.quantities import parse_unit, prefixed, quantity_words, read_unit, unit_of_key
-from mechanics.recording import recording
+from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model import files as model_files
+from palpate.mechanics.quantities import parse_unit, prefixed, quantity_words, read_unit, unit_of_key
+from palpate.mechanics.recording import recording
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("mechanics", "reconstruct", "render", "devices", "scenes", "diagnose", "palpate")
+PACKAGES = ("mechanics", "reconstruct", "render", "devices", "scenes", "diagnose", "shell")
 WITHOUT_UNIT_IN_NAME = {"boundary_phase": "s", "support_point": "m", "angle": "rad"}
 
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.disk.toml_text import dump_toml
-from mechanics.errors import RecordingError
-from mechanics.recording.recording import Recording, read_recording, write_recording
-from mechanics.recording.segments import Segment
+from palpate.mechanics.disk.toml_text import dump_toml
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.recording.recording import Recording, read_recording, write_recording
+from palpate.mechanics.recording.segments import Segment
 
 TOML = """[recording]
 sample_rate_hz = 1000.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.compliance.patch import triangle_shapes
-from mechanics.compliance.surface_compliance import edge_middles
-from mechanics.shape.nearest import closest
+from palpate.mechanics.compliance.patch import triangle_shapes
+from palpate.mechanics.compliance.surface_compliance import edge_middles
+from palpate.mechanics.shape.nearest import closest
 
 
 def surface(box):

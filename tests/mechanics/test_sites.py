@@ -7,13 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import LoadPatch, mean_curvature, patch_width, touch_sites, touch_solver
-from mechanics.compliance.surface_compliance import surface_compliance
-from mechanics.contact.touch import touch_force
-from mechanics.elastic.pardiso import available
-from mechanics.elastic.solver import Solver
-from mechanics.errors import MeshError
-from mechanics.shape.refine import refined_around, refined_near_surface, typical_edge
+from palpate.mechanics.compliance.sites import (
+    LoadPatch,
+    mean_curvature,
+    patch_width,
+    touch_sites,
+    touch_solver,
+)
+from palpate.mechanics.compliance.surface_compliance import surface_compliance
+from palpate.mechanics.contact.touch import touch_force
+from palpate.mechanics.elastic.pardiso import available
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.shape.refine import refined_around, refined_near_surface, typical_edge
 
 from .closed_forms import hertz_force
 

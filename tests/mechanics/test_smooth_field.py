@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compliance.smooth_field import (
+from palpate.mechanics.compliance.smooth_field import (
     Shares,
     SmoothField,
     correlation,

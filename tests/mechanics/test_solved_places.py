@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.contact.depth_factors import CONVERGENCE, DepthFactors
-from mechanics.contact.touch import TouchedPlaces, touch_forces
-from mechanics.errors import OptionError
-from mechanics.press_solver import solved_places
-from mechanics.press_solver.solved_places import Touched, felt_of, said_beforehand, solve_touched
-from mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.contact.depth_factors import CONVERGENCE, DepthFactors
+from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.press_solver import solved_places
+from palpate.mechanics.press_solver.solved_places import Touched, felt_of, said_beforehand, solve_touched
+from palpate.mechanics.shape.box_mesh import box_mesh
 
 E, NU, TIP = 20e3, 0.49, 0.005
 UP = np.array([0.0, 0.0, 1.0])
@@ -118,12 +118,12 @@ def test_time_is_said_by_places_and_laws():
 
 @pytest.mark.slow
 def test_a_solved_place_of_a_block_lies_beside_the_law(tmp_path, monkeypatch):
-    from mechanics.compliance.compression import own_blocks
-    from mechanics.compliance.patch import PATCH_WIDTH_M as WIDTH
-    from mechanics.compliance.patch import half_space_compliance
-    from mechanics.compliance.sites import SURFACE_EDGE_M
-    from mechanics.elastic.solver import Solver
-    from mechanics.shape.refine import refined_near_surface
+    from palpate.mechanics.compliance.compression import own_blocks
+    from palpate.mechanics.compliance.patch import PATCH_WIDTH_M as WIDTH
+    from palpate.mechanics.compliance.patch import half_space_compliance
+    from palpate.mechanics.compliance.sites import SURFACE_EDGE_M
+    from palpate.mechanics.elastic.solver import Solver
+    from palpate.mechanics.shape.refine import refined_near_surface
 
     monkeypatch.setattr(solved_places, "cache_folder", lambda: tmp_path)
     mesh = box_mesh((8, 8, 4), (0.08, 0.08, 0.04))

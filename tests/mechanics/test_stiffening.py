@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.contact.dent import dent_law, grid
-from mechanics.effects.strain_stiffening import GREATEST, LEAST, hardening, stiffening
+from palpate.mechanics.contact.dent import dent_law, grid
+from palpate.mechanics.effects.strain_stiffening import GREATEST, LEAST, hardening, stiffening
 
 RATIOS = (LEAST, -0.3, -0.1, -0.02, 0.0, 0.02, 0.1, 0.35, 1.0, 2.5, GREATEST)
 

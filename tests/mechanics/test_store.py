@@ -8,12 +8,12 @@ import os
 import numpy as np
 import pytest
 
-from mechanics.compliance.stored_compliance import load_or_condense
-from mechanics.disk.store import content_key, load_or_build, read_arrays, write_arrays
-from mechanics.errors import CacheError
-from mechanics.model.files import read_model, write_model
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.compliance.stored_compliance import load_or_condense
+from palpate.mechanics.disk.store import content_key, load_or_build, read_arrays, write_arrays
+from palpate.mechanics.errors import CacheError
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
 
 from ..support.waiting import PATIENCE_S
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import touch_sites
-from mechanics.effects.hold import base_hold
-from mechanics.elastic.elasticity import triangle_mass
-from mechanics.elastic.held_base import BaseHold, base_triangles
-from mechanics.elastic.solver import Solver
-from mechanics.errors import OptionError
+from palpate.mechanics.compliance.sites import touch_sites
+from palpate.mechanics.effects.hold import base_hold
+from palpate.mechanics.elastic.elasticity import triangle_mass
+from palpate.mechanics.elastic.held_base import BaseHold, base_triangles
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import OptionError
 
 UP = np.array([0.0, 0.0, 1.0])
 

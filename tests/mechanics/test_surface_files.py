@@ -15,10 +15,10 @@ import pyvista
 import trimesh
 from pyvista import examples
 
-from mechanics.disk.surface_files import UNITS, ClosedSurface, read_surface
-from mechanics.errors import SurfaceError
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.flat_foot import PointFoot, standing
+from palpate.mechanics.disk.surface_files import UNITS, ClosedSurface, read_surface
+from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.flat_foot import PointFoot, standing
 
 SIZE_MM = (60, 50, 40)
 

@@ -5,9 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.contact.dent import dent_law
-from mechanics.contact.touch import STATE_SIZE, TouchedPlaces, moduli, touch_force, touch_forces, touch_step
-from mechanics.frames import local_frames, support_axes, tangents
+from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.contact.touch import (
+    STATE_SIZE,
+    TouchedPlaces,
+    moduli,
+    touch_force,
+    touch_forces,
+    touch_step,
+)
+from palpate.mechanics.frames import local_frames, support_axes, tangents
 
 from .closed_forms import bonded_punch_sideways_force, hertz_force
 

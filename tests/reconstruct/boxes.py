@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 
 def box(size: tuple[float, float, float], cells: tuple[int, int, int]) -> TetMesh:

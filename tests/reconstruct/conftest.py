@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import touch_solver
-from mechanics.elastic.solver import Solver
-from mechanics.recording.recording import Recording
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.sites import touch_solver
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 from .exploration_of_cylinder import explore_cylinder
 
@@ -36,5 +36,5 @@ def factorised_once() -> Iterator[None]:
         return kept[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("reconstruct.methods.touch_solver", shared)
+        patch.setattr("palpate.reconstruction.methods.touch_solver", shared)
         yield

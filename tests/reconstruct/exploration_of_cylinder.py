@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mechanics.recording.recording import Recording
+from palpate.mechanics.recording.recording import Recording
 
 RATE = 1000.0
 TIP = 0.005

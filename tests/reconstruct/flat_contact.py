@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.contact.dent import dent_law
-from mechanics.recording.recording import Recording
+from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.recording.recording import Recording
 
 from .flat_ground import MODULUS_PA, NOISE_N, TIP_M
 

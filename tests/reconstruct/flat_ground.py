@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.contact.touch import forces_at
-from mechanics.recording.recording import Recording
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.recording.recording import Recording
 
 MODULUS_PA, TIP_M, NOISE_N = 12e3, 0.004, 0.004
 

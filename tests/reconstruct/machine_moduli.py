@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from mechanics.contact.dent import dent_law
-from mechanics.errors import ContactError, RecordingError
-from mechanics.robust import spread_about_zero
-from reconstruct.machine_curves.compression import Compression
-from reconstruct.machine_curves.indentation import Indentation
+from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.errors import ContactError, RecordingError
+from palpate.mechanics.robust import spread_about_zero
+from palpate.reconstruction.machine_curves.compression import Compression
+from palpate.reconstruction.machine_curves.indentation import Indentation
 
 
 def small_strain_modulus(test: Compression, *, low: float = 0.0, high: float = 0.05) -> float:

@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.recording.recording import Recording
-from reconstruct.checks.handedness import slides_agree
-from reconstruct.checks.registry import checked_samples
-from reconstruct.checks.samples import Samples
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.checks.handedness import slides_agree
+from palpate.reconstruction.checks.registry import checked_samples
+from palpate.reconstruction.checks.samples import Samples
 
 from .flat_contact import pushed, recorded
 from .flat_ground import NOISE_N, TIP_M, raster

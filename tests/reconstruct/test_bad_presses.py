@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.recording.recording import Recording
-from reconstruct.geometry.in_device_frame import nowhere
-from reconstruct.geometry.stated import GeometryOptions
-from reconstruct.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
-from reconstruct.steps.s3_contacts.contacts import ContactOptions
-from reconstruct.steps.s3_contacts.left_out import off_surface
-from reconstruct.steps.s3_contacts.quasi_static import explore_points
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.reconstruction.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions
+from palpate.reconstruction.steps.s3_contacts.left_out import off_surface
+from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points
 
 from .flat_contact import points
 from .flat_ground import MODULUS_PA, raster

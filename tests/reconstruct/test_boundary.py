@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.errors import ContactError
-from reconstruct.shapes.points import farthest_points, fit_plane, in_its_plane
-from reconstruct.steps.s2_base.boundary import BoundaryOptions, find_boundary
-from reconstruct.steps.s2_base.tracing_interval import find_interval
-from reconstruct.steps.s3_contacts.contacts import explore
+from palpate.mechanics.errors import ContactError
+from palpate.reconstruction.shapes.points import farthest_points, fit_plane, in_its_plane
+from palpate.reconstruction.steps.s2_base.boundary import BoundaryOptions, find_boundary
+from palpate.reconstruction.steps.s2_base.tracing_interval import find_interval
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
 from .exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
 

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from diagnose.calibrate.on_object import STIFFEST, instrument_of
-from diagnose.calibrate.on_plate import calibrate_on_plate
-from mechanics.errors import ContactError, OptionError, RecordingError
-from mechanics.recording.calibration import Calibration, read_calibration
-from mechanics.recording.recording import read_recording, write_recording
-from mechanics.recording.segments import delayed
 from palpate import cli
-from reconstruct.geometry.in_device_frame import nowhere
-from reconstruct.steps.s3_contacts.contacts import explore
-from scenes.embedded import embedded_recording
+from palpate.diagnosis.calibrate.on_object import STIFFEST, instrument_of
+from palpate.diagnosis.calibrate.on_plate import calibrate_on_plate
+from palpate.mechanics.errors import ContactError, OptionError, RecordingError
+from palpate.mechanics.recording.calibration import Calibration, read_calibration
+from palpate.mechanics.recording.recording import read_recording, write_recording
+from palpate.mechanics.recording.segments import delayed
+from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
+from palpate.scenes.embedded import embedded_recording
 
 from .flat_contact import recorded
 from .flat_ground import MODULUS_PA, TIP_M, raster

@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.errors import PalpateError, RecordingError
-from reconstruct.checks.finding import Finding, decades_of_tail
-from reconstruct.checks.outcome import Outcome, outcome
-from reconstruct.checks.registry import Checkup, check, checked_samples, widened
-from reconstruct.checks.samples import Samples
-from reconstruct.checks.units import measured
+from palpate.mechanics.errors import PalpateError, RecordingError
+from palpate.reconstruction.checks.finding import Finding, decades_of_tail
+from palpate.reconstruction.checks.outcome import Outcome, outcome
+from palpate.reconstruction.checks.registry import Checkup, check, checked_samples, widened
+from palpate.reconstruction.checks.samples import Samples
+from palpate.reconstruction.checks.units import measured
 
 from ..support.faults import FAULTS
 from .exploration_of_cylinder import explore_cylinder

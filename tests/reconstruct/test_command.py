@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from mechanics.model.files import read_model
-from mechanics.recording.recording import write_recording
 from palpate import cli
+from palpate.mechanics.model.files import read_model
+from palpate.mechanics.recording.recording import write_recording
 
 from .exploration_of_cylinder import explore_cylinder
 

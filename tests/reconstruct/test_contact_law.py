@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reconstruct.steps.s3_contacts.contact_law import contact_law, fit_rise
+from palpate.reconstruction.steps.s3_contacts.contact_law import contact_law, fit_rise
 
 
 @pytest.mark.parametrize(("hertz", "compliance"), [(2000.0, 2e-3), (2000.0, 1e-9), (1e5, 5e-3), (50.0, 1e-3)])

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from diagnose.forward.touches import unobservable_effects
-from diagnose.pipeline import with_tip_of
-from mechanics.errors import ContactError, OptionError
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.geometry.in_device_frame import nowhere
-from reconstruct.presses_on_model import presses_on
-from reconstruct.steps.s1_filter.low_pass import low_pass, noise_gain
-from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
-from reconstruct.steps.s3_contacts.cycles import free_air_seen
-from reconstruct.steps.s3_contacts.quasi_static import explore_points
-from render.replay import replay_error
+from palpate.diagnosis.forward.touches import unobservable_effects
+from palpate.diagnosis.pipeline import with_tip_of
+from palpate.mechanics.errors import ContactError, OptionError
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.presses_on_model import presses_on
+from palpate.reconstruction.steps.s1_filter.low_pass import low_pass, noise_gain
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
+from palpate.reconstruction.steps.s3_contacts.cycles import free_air_seen
+from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points
+from palpate.render.replay import replay_error
 
 from .flat_contact import cyclic, points, pushed, recorded
 from .flat_ground import MODULUS_PA, NOISE_N, TIP_M, raster

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import trimesh
 
-from mechanics.model.files import read_model
-from mechanics.recording.recording import write_recording
 from palpate import cli
-from reconstruct.geometry.in_device_frame import nowhere
-from reconstruct.geometry.known_shape import place
-from reconstruct.geometry.stated import GeometryOptions
-from reconstruct.steps.s3_contacts.contacts import explore
-from reconstruct.steps.s7_modulus.held_out import held_out, modulus_by_others
-from reconstruct.steps.s7_modulus.modulus import fit_modulus
+from palpate.mechanics.model.files import read_model
+from palpate.mechanics.recording.recording import write_recording
+from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.geometry.known_shape import place
+from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
+from palpate.reconstruction.steps.s7_modulus.held_out import held_out, modulus_by_others
+from palpate.reconstruction.steps.s7_modulus.modulus import fit_modulus
 
 from .exploration_of_cylinder import HEIGHT, RADIUS, explore_cylinder
 from .flat_ground import NOISE_N, raster
@@ -73,7 +73,7 @@ def test_a_modulus_is_weighed_against_a_constant_push(depth_matters):
 
 
 def _half_space(presses):
-    from mechanics.compliance.sites import TouchSites
+    from palpate.mechanics.compliance.sites import TouchSites
 
     none = np.zeros(len(presses))
     return TouchSites(presses.point, presses.normal, none, np.zeros((len(presses), 3, 3)), 0.005, 0.49)

@@ -8,15 +8,15 @@ import json
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import TouchSites, touch_sites
-from mechanics.contact.depth_factors import DepthFactors
-from mechanics.contact.touch import touch_forces
-from mechanics.errors import OptionError
-from mechanics.press_solver import solved_places
-from mechanics.recording.recording import write_recording
 from palpate import cli
-from reconstruct.methods import BY_NAME, ReconstructOptions
-from reconstruct.steps.s7_modulus.modulus import ModulusOptions, fit_modulus
+from palpate.mechanics.compliance.sites import TouchSites, touch_sites
+from palpate.mechanics.contact.depth_factors import DepthFactors
+from palpate.mechanics.contact.touch import touch_forces
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.press_solver import solved_places
+from palpate.mechanics.recording.recording import write_recording
+from palpate.reconstruction.methods import BY_NAME, ReconstructOptions
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusOptions, fit_modulus
 
 from .boxes import box
 from .exploration_of_cylinder import explore_cylinder
@@ -84,7 +84,7 @@ def test_the_command_says_time_and_both_moduli(tmp_path, monkeypatch, capsys):
 
 def _stiffer_than_the_law(self, point, normal, depths):
     """As a half-space answers, N over Pa."""
-    from mechanics.contact.touch import TouchedPlaces
+    from palpate.mechanics.contact.touch import TouchedPlaces
 
     way = np.concatenate([[0.0], depths])
     return touch_forces(

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from benchmarks._machine_curves import Elastomer, Held, fit_elastomer, fit_holds, hold_error
-from mechanics.contact.dent import dent_law
-from mechanics.errors import ContactError, RecordingError
-from reconstruct.machine_curves.compression import Compression, read_compression
-from reconstruct.machine_curves.indentation import read_chiaro
-from reconstruct.machine_curves.relaxation import fit_relaxation
+from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.errors import ContactError, RecordingError
+from palpate.reconstruction.machine_curves.compression import Compression, read_compression
+from palpate.reconstruction.machine_curves.indentation import read_chiaro
+from palpate.reconstruction.machine_curves.relaxation import fit_relaxation
 
 from .machine_moduli import fit_approach, small_strain_modulus
 

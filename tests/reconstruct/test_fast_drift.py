@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from reconstruct.steps.s1_filter.fast_drift import follow_free_air, interpolation_error, passing
-from reconstruct.steps.s1_filter.signals import filtered_of
+from palpate.reconstruction.steps.s1_filter.fast_drift import follow_free_air, interpolation_error, passing
+from palpate.reconstruction.steps.s1_filter.signals import filtered_of
 
 from .exploration_of_cylinder import explore_cylinder
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import palpate.show  # noqa: F401  what a reconstruction says
-from mechanics.model.one_d_laws import RIVALS
-from reconstruct.geometry.stated import GeometryOptions
-from reconstruct.methods import ReconstructOptions
-from reconstruct.pipeline import reconstruct_fully
-from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
-from reconstruct.steps.s7_modulus.modulus_field import FieldOptions
+from palpate.mechanics.model.one_d_laws import RIVALS
+from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.reconstruction.methods import ReconstructOptions
+from palpate.reconstruction.pipeline import reconstruct_fully
+from palpate.reconstruction.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
+from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions
 
 from .flat_contact import points
 

@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.recording.recording import Recording
-from reconstruct.steps.s3_contacts import contacts
-from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore, read_earlier
-from reconstruct.steps.s3_contacts.force_delay import Delay
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.steps.s3_contacts import contacts
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore, read_earlier
+from palpate.reconstruction.steps.s3_contacts.force_delay import Delay
 
 from .exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 

@@ -7,23 +7,23 @@ import pytest
 import trimesh
 
 import palpate as pp
-from mechanics.compliance.sites import SURFACE_EDGE_M
-from mechanics.errors import ContactError, OptionError, SurfaceError
-from mechanics.presses.repeats import sites_of
-from mechanics.shape.refine import refined_near_surface, typical_edge
 from palpate import cli
+from palpate.mechanics.compliance.sites import SURFACE_EDGE_M
+from palpate.mechanics.errors import ContactError, OptionError, SurfaceError
+from palpate.mechanics.presses.repeats import sites_of
+from palpate.mechanics.shape.refine import refined_near_surface, typical_edge
 from palpate.operations._declare import Call
 from palpate.operations._shared import given_model
-from reconstruct.geometry.in_device_frame import nowhere
-from reconstruct.geometry.known_shape import place
-from reconstruct.geometry.slab import flat_mesh
-from reconstruct.geometry.stated import GeometryOptions, stated_geometry
-from reconstruct.shapes.evidence import Evidence
-from reconstruct.shapes.fit import Seen
-from reconstruct.shapes.implicit import implicit_held_out
-from reconstruct.steps.s3_contacts.contacts import explore
-from reconstruct.steps.s3_contacts.left_out import without_slides
-from scenes.scene import Scene
+from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.geometry.known_shape import place
+from palpate.reconstruction.geometry.slab import flat_mesh
+from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
+from palpate.reconstruction.shapes.evidence import Evidence
+from palpate.reconstruction.shapes.fit import Seen
+from palpate.reconstruction.shapes.implicit import implicit_held_out
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
+from palpate.reconstruction.steps.s3_contacts.left_out import without_slides
+from palpate.scenes.scene import Scene
 
 from .flat_contact import points
 from .flat_ground import MODULUS_PA, TIP_M, raster

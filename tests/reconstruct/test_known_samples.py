@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mechanics.recording.recording import read_recording
+from palpate.mechanics.recording.recording import read_recording
+from palpate.reconstruction.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
+from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperOptions
 from palpate.show.reconstruction.modulus import height_trends
-from reconstruct.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
-from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
 
 pytestmark = pytest.mark.slow
 NAMES = ("silicone-1-cylinder", "silicone-2-block", "silicone-3-halfsphere")

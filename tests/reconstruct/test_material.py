@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from diagnose.forward.touches import touches_of
-from diagnose.specimen.approach import approach_of
-from diagnose.specimen.bench import Curve, Similarity, bench_of
-from diagnose.specimen.rivals import held_out_rivals
-from mechanics.contact.dent import dent_law
-from mechanics.errors import ContactError, OptionError, RecordingError
 from palpate import cli
-from reconstruct.machine_curves.relaxation import held_out_relaxation
-from reconstruct.machine_curves.uniaxial import LAWS, Uniaxial, chosen, fit_law, held_out
+from palpate.diagnosis.forward.touches import touches_of
+from palpate.diagnosis.specimen.approach import approach_of
+from palpate.diagnosis.specimen.bench import Curve, Similarity, bench_of
+from palpate.diagnosis.specimen.rivals import held_out_rivals
+from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.errors import ContactError, OptionError, RecordingError
+from palpate.reconstruction.machine_curves.relaxation import held_out_relaxation
+from palpate.reconstruction.machine_curves.uniaxial import LAWS, Uniaxial, chosen, fit_law, held_out
 
 
 def compression(folder, stiffening: float, count: int = 3, modulus: float = 60e3) -> list:

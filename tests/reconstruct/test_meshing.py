@@ -9,14 +9,20 @@ import pytest
 import trimesh
 from scipy.spatial import Delaunay
 
-import reconstruct.steps.s5_mesh.meshing as meshing_module
+import palpate.reconstruction.steps.s5_mesh.meshing as meshing_module
 from benchmarks._surface_truth import phantom_truth, touch
-from mechanics.errors import MeshError, SurfaceError
-from reconstruct.shapes.coarse_drawing import balanced
-from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, reconstruct_surface
-from reconstruct.steps.s5_mesh.meshing import MeshingOptions, _held, mesh_surface, radius_edge_ratio, relaxed
-from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
-from reconstruct.steps.s5_mesh.voxels import labels, voxel_surface
+from palpate.mechanics.errors import MeshError, SurfaceError
+from palpate.reconstruction.shapes.coarse_drawing import balanced
+from palpate.reconstruction.steps.s4_surface.surface import Surface, SurfaceOptions, reconstruct_surface
+from palpate.reconstruction.steps.s5_mesh.meshing import (
+    MeshingOptions,
+    _held,
+    mesh_surface,
+    radius_edge_ratio,
+    relaxed,
+)
+from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
+from palpate.reconstruction.steps.s5_mesh.voxels import labels, voxel_surface
 
 
 @pytest.fixture(scope="module")
@@ -50,8 +56,8 @@ def test_the_mesh_fills_the_surface(surface, meshing):
 
 
 def test_radius_edge_ratio_of_regular_tetrahedra():
-    from mechanics.shape.tetmesh import TetMesh
-    from reconstruct.steps.s5_mesh.meshing import quality
+    from palpate.mechanics.shape.tetmesh import TetMesh
+    from palpate.reconstruction.steps.s5_mesh.meshing import quality
 
     corner = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
     cell = np.array([[0, 1, 3, 2]])
@@ -75,7 +81,7 @@ def test_uncertainty_reaches_the_nodes(surface, meshing):
 
 
 def test_a_coarse_drawing_keeps_the_volume():
-    from reconstruct.shapes.cap import Cap
+    from palpate.reconstruction.shapes.cap import Cap
 
     ball = Cap.sphere(np.array([0.0, 0, 0.01]), 0.05)
     fine, coarse = ball.mesh(0.002), ball.mesh(0.009)
@@ -87,7 +93,7 @@ def test_a_coarse_drawing_keeps_the_volume():
 
 
 def test_voxels_keep_the_base_and_the_volume():
-    from reconstruct.shapes.cap import Cap
+    from palpate.reconstruction.shapes.cap import Cap
 
     given = Cap.sphere(np.array([0.0, 0, 0.01]), 0.03).mesh(0.006)
     found = voxel_surface(*given, 0.002)
@@ -187,7 +193,7 @@ def test_bad_tetrahedra_are_relaxed_and_nothing_else_moves():
 
 
 def test_no_label_is_lost_where_a_line_meets_an_edge():
-    from reconstruct.shapes.cap import Cap
+    from palpate.reconstruction.shapes.cap import Cap
 
     inside, low = labels(*Cap.sphere(np.array([0.0, 0, 0.01]), 0.03).mesh(0.006), 0.002)
     layers, rows, columns = np.nonzero(inside)

@@ -5,16 +5,21 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites
-from mechanics.contact.touch import forces_at
-from mechanics.elastic.solver import Solver
-from mechanics.presses.making import PathErrors, of_paths
-from mechanics.presses.repeats import sites_of
-from mechanics.presses.table import Presses
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.steps.s7_modulus.modulus import ModulusOptions, between_sites, combine, fit_modulus
-from reconstruct.steps.s7_modulus.press_fit import fit_law, press_data
-from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
+from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.presses.making import PathErrors, of_paths
+from palpate.mechanics.presses.repeats import sites_of
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.steps.s7_modulus.modulus import (
+    ModulusOptions,
+    between_sites,
+    combine,
+    fit_modulus,
+)
+from palpate.reconstruction.steps.s7_modulus.press_fit import fit_law, press_data
+from palpate.reconstruction.steps.s7_modulus.shape_error import compliance_covariance
 
 from .boxes import box
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mechanics.elastic.solver import Solver
-from mechanics.errors import ContactError
-from mechanics.presses.making import of_paths
-from mechanics.presses.table import Presses
-from reconstruct.steps.s7_modulus.modulus_paper import (
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.presses.making import of_paths
+from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.steps.s7_modulus.modulus_paper import (
     PaperOptions,
     base_reactions,
     fit_paper_modulus,

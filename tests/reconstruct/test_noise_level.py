@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from reconstruct.steps.s1_filter.low_pass import low_pass, low_pass_at
-from reconstruct.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
-from reconstruct.steps.s1_filter.signals import hysteresis
+from palpate.reconstruction.steps.s1_filter.low_pass import low_pass, low_pass_at
+from palpate.reconstruction.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
+from palpate.reconstruction.steps.s1_filter.signals import hysteresis
 
 RATE, CUTOFF = 1000.0, 25.0
 

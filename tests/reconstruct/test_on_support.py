@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.errors import ContactError
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import Segment
-from reconstruct.checks.support import support
-from reconstruct.geometry.in_device_frame import nowhere
-from reconstruct.steps.s3_contacts.contacts import Exploration, explore
-from reconstruct.steps.s3_contacts.left_out import on_base
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import Segment
+from palpate.reconstruction.checks.support import support
+from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
+from palpate.reconstruction.steps.s3_contacts.left_out import on_base
 
 
 def _with_more(recording: Recording, position: np.ndarray, force: np.ndarray) -> Recording:

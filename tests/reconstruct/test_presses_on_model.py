@@ -1,7 +1,7 @@
 """Presses of a recording on a model that was not made from it."""
 
 from benchmarks.play import Case, recorded
-from reconstruct.presses_on_model import presses_on
+from palpate.reconstruction.presses_on_model import presses_on
 
 
 def test_slides_of_the_object_are_no_tracing_of_its_base():

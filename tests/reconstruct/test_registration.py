@@ -10,13 +10,13 @@ import pyvista
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from mechanics.compliance.sites import touch_sites, touch_solver
-from mechanics.presses.table import Presses
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import vertex_normals
-from reconstruct.geometry.registration import Body, Registration, Touched, register
-from reconstruct.steps.s3_contacts.left_out import sliding
-from reconstruct.steps.s7_modulus.shape_error import PoseError, compliance_covariance
+from palpate.mechanics.compliance.sites import touch_sites, touch_solver
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import vertex_normals
+from palpate.reconstruction.geometry.registration import Body, Registration, Touched, register
+from palpate.reconstruction.steps.s3_contacts.left_out import sliding
+from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError, compliance_covariance
 
 TIP_M = 0.004
 
@@ -122,7 +122,7 @@ def test_the_poses_error_reaches_the_compliance_as_moving_the_object_does():
 
 
 def test_a_contact_that_wanders_is_a_slide():
-    from mechanics.presses.making import of_paths
+    from palpate.mechanics.presses.making import of_paths
 
     still = np.column_stack([np.zeros(50), np.zeros(50), 0.004 - 0.002 * np.sin(np.linspace(0, np.pi, 50))])
     wandering = still + np.column_stack([np.linspace(0, 0.05, 50), np.zeros((50, 2))])

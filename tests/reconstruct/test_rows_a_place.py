@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from benchmarks._tissue import tissue
-from mechanics.compliance.pressed_places import places_at
-from mechanics.compliance.sites import touch_sites
-from mechanics.presses.table import Presses
-from reconstruct.steps.s7_modulus.modulus import fit_modulus
-from reconstruct.steps.s7_modulus.modulus_field import (
+from palpate.mechanics.compliance.pressed_places import places_at
+from palpate.mechanics.compliance.sites import touch_sites
+from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.steps.s7_modulus.modulus import fit_modulus
+from palpate.reconstruction.steps.s7_modulus.modulus_field import (
     asked_for,
     fit_field,
     press_moduli,

@@ -8,19 +8,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.recording.recording import Recording
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.geometry.in_device_frame import nowhere
-from reconstruct.geometry.stated import GeometryOptions
-from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-from reconstruct.presses_on_model import presses_on
-from reconstruct.steps.s3_contacts.contacts import explore
-from reconstruct.steps.s3_contacts.straightened import slid_in, straightened
-from reconstruct.steps.s7_modulus.modulus import fit_modulus
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
+from palpate.reconstruction.presses_on_model import presses_on
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
+from palpate.reconstruction.steps.s3_contacts.straightened import slid_in, straightened
+from palpate.reconstruction.steps.s7_modulus.modulus import fit_modulus
 
 from .flat_contact import pushed, recorded
 from .flat_ground import MODULUS_PA, NOISE_N, TIP_M

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from reconstruct.steps.s1_filter.signals import free_air_force
+from palpate.reconstruction.steps.s1_filter.signals import free_air_force
 
 
 def test_a_long_tracing_that_is_stated_is_no_free_air():

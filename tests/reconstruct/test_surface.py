@@ -11,9 +11,9 @@ import pytest
 
 from benchmarks._surface_truth import OWN, phantom_truth, touch
 from benchmarks.surface import deviation
-from mechanics.errors import SurfaceError
-from reconstruct.shapes.evidence import Evidence
-from reconstruct.steps.s4_surface.surface import SurfaceOptions, reconstruct_surface
+from palpate.mechanics.errors import SurfaceError
+from palpate.reconstruction.shapes.evidence import Evidence
+from palpate.reconstruction.steps.s4_surface.surface import SurfaceOptions, reconstruct_surface
 
 from .exploration_of_cylinder import explore_cylinder
 
@@ -159,7 +159,7 @@ def test_uncertainty_covers_the_error_of_a_free_form():
     truth = OWN["blob"]()
     evidence, back = touch(truth, 2)
     found = reconstruct_surface(evidence)
-    from mechanics.shape.nearest import distance
+    from palpate.mechanics.shape.nearest import distance
 
     local = back(found.vertices)
     off = local[:, 2] > 0.012
@@ -199,9 +199,9 @@ def test_touches_on_the_support_alone_are_refused():
     ],
 )
 def test_the_labelled_recordings_meet_the_targets(shared_recordings, stem, name):
-    from mechanics.recording.recording import read_recording
-    from reconstruct.steps.s3_contacts.contacts import explore
-    from reconstruct.steps.s4_surface.surface import evidence_of
+    from palpate.mechanics.recording.recording import read_recording
+    from palpate.reconstruction.steps.s3_contacts.contacts import explore
+    from palpate.reconstruction.steps.s4_surface.surface import evidence_of
 
     recording = read_recording(shared_recordings / f"{stem}.toml")
     found = reconstruct_surface(evidence_of(explore(recording)))
@@ -215,8 +215,8 @@ def test_the_labelled_recordings_meet_the_targets(shared_recordings, stem, name)
 
 
 def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
-    from reconstruct.shapes.candidates import first_guesses
-    from reconstruct.shapes.fit import Seen, fit
+    from palpate.reconstruction.shapes.candidates import first_guesses
+    from palpate.reconstruction.shapes.fit import Seen, fit
 
     evidence, _ = touch(phantom_truth("cylinder"), 2)
     up = evidence.support_normal
@@ -240,8 +240,8 @@ def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
 
 
 def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_walls():
-    from reconstruct.shapes.choice import direction_score, try_shapes
-    from reconstruct.shapes.prism import Prism
+    from palpate.reconstruction.shapes.choice import direction_score, try_shapes
+    from palpate.reconstruction.shapes.prism import Prism
 
     truth = phantom_truth("bowl")
     evidence, _ = touch(truth, 0)
@@ -254,7 +254,7 @@ def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_wa
 
 def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeypatch):
     """A field beside a block once ended 1.8 m below the support."""
-    from reconstruct.shapes import choice as module
+    from palpate.reconstruction.shapes import choice as module
 
     evidence, _ = touch(phantom_truth("cylinder"), 0)
     honest, tried = module.draw, []
@@ -273,7 +273,7 @@ def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeyp
 
 def test_an_implicit_surface_that_is_open_is_no_rival(monkeypatch):
     """It was tried where no shape explains the touches, and its fault refused the recording."""
-    from reconstruct.steps.s4_surface import surface as module
+    from palpate.reconstruction.steps.s4_surface import surface as module
 
     asked = []
 
@@ -288,8 +288,8 @@ def test_an_implicit_surface_that_is_open_is_no_rival(monkeypatch):
 
 
 def test_a_first_touch_known_by_far_less_well_than_the_others_places_no_surface():
-    from reconstruct.steps.s3_contacts.contacts import explore
-    from reconstruct.steps.s4_surface.surface import evidence_of
+    from palpate.reconstruction.steps.s3_contacts.contacts import explore
+    from palpate.reconstruction.steps.s4_surface.surface import evidence_of
 
     found = explore(explore_cylinder(noise=0.01)[0])
     error = found.presses.onset_error_m.copy()

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from mechanics.recording.recording import Recording
-from reconstruct.steps.s3_contacts.contacts import explore
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
 from .exploration_of_cylinder import TILTED, TIP, Frame, explore_cylinder
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.presses.making import of_places
+from palpate.mechanics.presses.making import of_places
 
 from . import shapes
 

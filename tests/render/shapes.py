@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.compliance.sites import patch_width
-from mechanics.compliance.surface_compliance import SurfaceCompliance, patch_blocks
-from mechanics.elastic.solver import Solver
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.shape.tetmesh import TetMesh, vertex_normals
-from render.fem.renderer import FemRenderer
-from render.options import RenderOptions
+from palpate.mechanics.compliance.sites import patch_width
+from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance, patch_blocks
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
 
 _SIX = np.array([[0, 1, 3, 7], [0, 1, 7, 5], [0, 5, 7, 4], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7]])
 

@@ -8,15 +8,15 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mechanics.model.one_d_laws import LAWS
-from render.one_d.renderer import OneDRenderer
-from render.press import Stroke, press
-from render.registry import RENDERERS, create, names
+from palpate.mechanics.model.one_d_laws import LAWS
+from palpate.render.one_d.renderer import OneDRenderer
+from palpate.render.press import Stroke, press
+from palpate.render.registry import RENDERERS, create, names
 
 
 def _module() -> ModuleType:
     """What `render/twice.py` would hold: springs of twice the stiffness."""
-    module = ModuleType("render.twice")
+    module = ModuleType("palpate.render.twice")
 
     def made(name, model, options, progress):
         fits = {key: 2 * np.asarray(values) for key, values in model.presses.fits.items()}
@@ -27,8 +27,8 @@ def _module() -> ModuleType:
 
 
 def test_a_renderer_is_added_in_one_file_and_one_line(one_d_model, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setitem(sys.modules, "render.twice", _module())
-    monkeypatch.setitem(RENDERERS, "twice", "render.twice")
+    monkeypatch.setitem(sys.modules, "palpate.render.twice", _module())
+    monkeypatch.setitem(RENDERERS, "twice", "palpate.render.twice")
     assert "twice" in names()
     at, down = one_d_model.presses.point[0], [0.0, 0.0, -1.0]
     once, twice = (

@@ -1,14 +1,8 @@
 """Each kernel of the renderer and of the tick is compiled for one kind of arguments, and once a machine."""
 
 import json
-import os
 import subprocess
 import sys
-from pathlib import Path
-
-import mechanics
-
-ROOT = Path(mechanics.__file__).parents[1]
 
 COMPILING = """
 import gc
@@ -30,7 +24,7 @@ class Watch(event.Listener):
 event.register("numba:compile", Watch())
 
 import palpate.warm_up
-from render.press import Stroke, press
+from palpate.render.press import Stroke, press
 
 renderer = palpate.warm_up.block_renderer()
 for work in palpate.warm_up.stages(renderer).values():
@@ -56,10 +50,7 @@ def compiled() -> tuple[list[str], list[list[str]]]:
     """What a process of its own compiles for steps, a press, a replay and a tick; and each kind of arguments
     that one of our kernels then is compiled for: its name and the records among them, as a renderer's."""
     # the cache that all tests share: the first of two processes fills it where it lacks something
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", COMPILING], env=environment, capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "-P", "-c", COMPILING], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     found, kinds = json.loads(done.stdout.splitlines()[-1])
     return found, kinds
@@ -68,8 +59,10 @@ def compiled() -> tuple[list[str], list[list[str]]]:
 def test_a_kernel_is_compiled_once_and_found_by_the_next_process():
     compiled()
     found, kinds = compiled()
-    assert {"render.fem.kernel.fem_step", "render.base._follow", "palpate.servo.loop.compiled_loop"} <= {
-        name for name, *_ in kinds
-    }
+    assert {
+        "palpate.render.fem.kernel.fem_step",
+        "palpate.render.base._follow",
+        "palpate.servo.loop.compiled_loop",
+    } <= {name for name, *_ in kinds}
     assert sorted(kinds) == sorted(map(list, {*map(tuple, kinds)}))
     assert found == []

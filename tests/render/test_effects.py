@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.errors import ModelError
+from palpate.mechanics.errors import ModelError
 
 from . import shapes
 
@@ -20,8 +20,8 @@ def base():
 
 
 def render_with(base, **effects):
-    from render.fem.renderer import FemRenderer
-    from render.options import RenderOptions
+    from palpate.render.fem.renderer import FemRenderer
+    from palpate.render.options import RenderOptions
 
     made, compliance = base
     return FemRenderer(

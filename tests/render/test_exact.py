@@ -9,15 +9,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import render.exact
-from mechanics.errors import OptionError
-from mechanics.model.files import write_model
-from mechanics.press_solver import solved_places
-from mechanics.press_solver.press import PressOptions
-from mechanics.press_solver.solved_places import SolvedPlace, deepest_of_sites
+import palpate.render.exact
 from palpate.cli import main
-from render.exact import ExactPlaces, exact_replay, press_options
-from render.press import Stroke, press, solved
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.files import write_model
+from palpate.mechanics.press_solver import solved_places
+from palpate.mechanics.press_solver.press import PressOptions
+from palpate.mechanics.press_solver.solved_places import SolvedPlace, deepest_of_sites
+from palpate.render.exact import ExactPlaces, exact_replay, press_options
+from palpate.render.press import Stroke, press, solved
 
 from . import shapes
 
@@ -110,7 +110,7 @@ def test_what_the_solver_does_not_know_is_refused(cylinder_renderer):
 
 def test_the_command_says_law_solution_and_bound(kept, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(solved_places, "cache_folder", lambda: kept)
-    monkeypatch.setattr(render.exact, "press_options", lambda renderer: COARSE)
+    monkeypatch.setattr(palpate.render.exact, "press_options", lambda renderer: COARSE)
     folder = str(write_model(tmp_path / "block", shapes.model(shapes.block((0.06, 0.06, 0.03), (4, 4, 2)))))
     result = tmp_path / "press.json"
     place = ["press", folder, "--at", "0,0,0.03", "--depth", "0.002", "--exact"]

@@ -8,15 +8,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.model.files import read_model, write_model
-from mechanics.model.model import Model
-from mechanics.presses.making import no_presses, of_places
 from palpate.cli import main
-from render.options import RenderOptions
-from render.press import Stroke, press
-from render.surface.felt_surface import FILE, OWN_DEPTH_M, PRESSES, TOUCHES, felt_surface, with_own_stiffness
-from render.surface.snapping import ONSET_NOISE_M, touched_surface
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.presses.making import no_presses, of_places
+from palpate.render.options import RenderOptions
+from palpate.render.press import Stroke, press
+from palpate.render.surface.felt_surface import (
+    FILE,
+    OWN_DEPTH_M,
+    PRESSES,
+    TOUCHES,
+    felt_surface,
+    with_own_stiffness,
+)
+from palpate.render.surface.snapping import ONSET_NOISE_M, touched_surface
 
 from . import shapes
 

@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import touch_sites
-from mechanics.contact.touch import touch_force
-from mechanics.elastic.solver import Solver
-from render.fem.renderer import FemRenderer
+from palpate.mechanics.compliance.sites import touch_sites
+from palpate.mechanics.contact.touch import touch_force
+from palpate.mechanics.elastic.solver import Solver
+from palpate.render.fem.renderer import FemRenderer
 
 TIP = 0.005
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import render
-from render.force_error import error_figures, force_errors, law_share
+from palpate import render
+from palpate.render.force_error import error_figures, force_errors, law_share
 
 
 def test_the_law_is_surer_on_flat_ground_than_deep_on_a_bump_or_beside_a_rim():

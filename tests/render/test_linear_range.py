@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import touch_sites
-from mechanics.contact.linear_range import linear_range
-from mechanics.elastic.solver import Solver
-from render.fem.renderer import FemRenderer
-from render.options import RenderOptions
-from render.press import Stroke, press
+from palpate.mechanics.compliance.sites import touch_sites
+from palpate.mechanics.contact.linear_range import linear_range
+from palpate.mechanics.elastic.solver import Solver
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
+from palpate.render.press import Stroke, press
 
 from . import shapes
 

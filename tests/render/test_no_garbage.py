@@ -6,7 +6,7 @@ import gc
 
 import numpy as np
 
-from render.surface.bvh import build_bvh
+from palpate.render.surface.bvh import build_bvh
 
 
 def test_a_tree_of_triangles_leaves_no_cycle():

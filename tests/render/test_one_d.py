@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import render
-from mechanics.errors import ModelError, OptionError
-from mechanics.model.one_d_laws import Law, spread_law
-from mechanics.presses.making import no_presses
+from palpate import render
+from palpate.mechanics.errors import ModelError, OptionError
+from palpate.mechanics.model.one_d_laws import Law, spread_law
+from palpate.mechanics.presses.making import no_presses
 
 TIP = 0.005
 

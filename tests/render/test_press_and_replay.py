@@ -8,12 +8,12 @@ import json
 import numpy as np
 import pytest
 
-from mechanics.errors import OptionError, RecordingError
-from mechanics.presses.cutting import FoundPresses, cut
-from mechanics.recording.recording import Recording
 from palpate.cli import main
-from render.press import Stroke, greatest_difference, press, read_curve, write_curve
-from render.replay import replay, replay_error, replay_touches
+from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.presses.cutting import FoundPresses, cut
+from palpate.mechanics.recording.recording import Recording
+from palpate.render.press import Stroke, greatest_difference, press, read_curve, write_curve
+from palpate.render.replay import replay, replay_error, replay_touches
 
 TIP = 0.005
 

@@ -6,11 +6,11 @@ import json
 
 import pytest
 
-from mechanics.errors import OptionError
-from mechanics.model.files import write_model
 from palpate.cli import main
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.files import write_model
+from palpate.render.press import read_curve
 from palpate.testing import press_model  # noqa: F401  (pytest finds the fixture by its name)
-from render.press import read_curve
 
 from . import shapes
 

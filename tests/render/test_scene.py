@@ -8,13 +8,13 @@ import json
 import numpy as np
 import pytest
 
-from mechanics.errors import OptionError
-from mechanics.model.files import write_model
 from palpate.cli import main
-from render.press import Stroke, press, read_curve
-from render.replay import replay
-from render.scene import TouchScene, in_the_air, scene_of
-from render.support import SupportOptions, support_plane
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.files import write_model
+from palpate.render.press import Stroke, press, read_curve
+from palpate.render.replay import replay
+from palpate.render.scene import TouchScene, in_the_air, scene_of
+from palpate.render.support import SupportOptions, support_plane
 
 from . import shapes
 

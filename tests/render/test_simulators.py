@@ -8,17 +8,17 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from mechanics.errors import OptionError
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.progress import silent
-from mechanics.shape.box_mesh import box_mesh
-from render.options import DOCUMENTED, RenderOptions
-from render.press import Stroke, press
-from render.registry import create, names, simulator_names
-from render.replay import replay
-from render.scene import in_the_air
-from render.simulators.base import Adapter, SimulatorRenderer, SteppedWorld
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.progress import silent
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.render.options import DOCUMENTED, RenderOptions
+from palpate.render.press import Stroke, press
+from palpate.render.registry import create, names, simulator_names
+from palpate.render.replay import replay
+from palpate.render.scene import in_the_air
+from palpate.render.simulators.base import Adapter, SimulatorRenderer, SteppedWorld
 
 E, NU, RADIUS = 30e3, 0.4, 0.006
 
@@ -57,7 +57,7 @@ def test_a_softer_penalty_is_a_softer_contact(model):
 
 def test_a_contact_without_balance_is_an_error_and_no_force(model, monkeypatch):
     pytest.importorskip("skfem")
-    monkeypatch.setattr("render.simulators.scikit_fem.ITERATIONS", 1)
+    monkeypatch.setattr("palpate.render.simulators.scikit_fem.ITERATIONS", 1)
     with pytest.raises(OptionError, match="finds no balance .* lower --simulator-set penalty=10"):
         pressed(model, "scikit-fem")
 

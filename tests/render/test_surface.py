@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.presses.making import of_places
-from render.options import RenderOptions
-from render.surface.bvh import STACK, closest_triangle
-from render.surface.contact_surface import contact_surface
-from render.surface.snapping import touch_gaps, touched_surface
+from palpate.mechanics.presses.making import of_places
+from palpate.render.options import RenderOptions
+from palpate.render.surface.bvh import STACK, closest_triangle
+from palpate.render.surface.contact_surface import contact_surface
+from palpate.render.surface.snapping import touch_gaps, touched_surface
 
 from . import shapes
 

@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from mechanics.model.files import read_model, write_model
-from mechanics.shape.nearest import neighbours, sample
-from mechanics.shape.tetmesh import TetMesh
-from mechanics.shape.true_shape import TrueShape
-from render.fem.renderer import far_field
-from render.surface.contact_surface import contact_surface
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.shape.nearest import neighbours, sample
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.true_shape import TrueShape
+from palpate.render.fem.renderer import far_field
+from palpate.render.surface.contact_surface import contact_surface
 
 from . import shapes
 

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.compliance.stored_compliance import compliance_file, compliance_key, load_or_condense
-from mechanics.errors import FileError, PalpateWarning
-from mechanics.model.files import read_model, write_model
-from mechanics.model.model import Model
-from mechanics.progress import Progress
+from palpate.mechanics.compliance.stored_compliance import compliance_file, compliance_key, load_or_condense
+from palpate.mechanics.errors import FileError, PalpateWarning
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.progress import Progress
+from palpate.render.fem.renderer import FemRenderer
+from palpate.scenes import build, shipped
+from palpate.scenes.scene import Scene, load_scene
 from palpate.warm_up import block_renderer
-from render.fem.renderer import FemRenderer
-from scenes import build, shipped
-from scenes.scene import Scene, load_scene
 
 MAKE = "what is shipped is not what this program makes: run 'python -m tools.shipped_models' and commit it"
 MOST_BYTES = 15_000_000

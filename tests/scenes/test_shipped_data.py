@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
-from mechanics.compliance.stored_compliance import compliance_file, compliance_key, load_or_condense
-from mechanics.model.model import Model
-from mechanics.recording.recording import read_recording
-from reconstruct.pipeline import reconstruct
-from render.fem.renderer import FemRenderer
-from render.surface.felt_surface import PRESSES, felt_surface, with_own_stiffness
-from scenes import shipped
-from scenes.build import folder_name, model_of
-from scenes.embedded import embedded_recording
-from scenes.scene import load_scene
+from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
+from palpate.mechanics.compliance.stored_compliance import compliance_file, compliance_key, load_or_condense
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import read_recording
+from palpate.reconstruction.pipeline import reconstruct
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.surface.felt_surface import PRESSES, felt_surface, with_own_stiffness
+from palpate.scenes import shipped
+from palpate.scenes.build import folder_name, model_of
+from palpate.scenes.embedded import embedded_recording
+from palpate.scenes.scene import load_scene
 from tools.shipped_models import SHIPPED
 
 MAKE = (
@@ -49,8 +49,8 @@ def test_nothing_is_computed_for_a_first_touch(model: Model, monkeypatch: pytest
 
     assert model.path is not None
     assert (model.path / compliance_file(compliance_key(model))).is_file(), MAKE
-    monkeypatch.setattr("mechanics.compliance.stored_compliance.surface_compliance", none)
-    monkeypatch.setattr("render.surface.felt_surface.local_stiffness", none)
+    monkeypatch.setattr("palpate.mechanics.compliance.stored_compliance.surface_compliance", none)
+    monkeypatch.setattr("palpate.render.surface.felt_surface.local_stiffness", none)
     assert felt_surface(model).stiffness_from == PRESSES, MAKE
     with_own_stiffness(FemRenderer(model))
 

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.errors import ContactError, PalpateError
-from mechanics.recording.recording import Recording, read_recording
-from reconstruct.checks.finding import Finding
-from reconstruct.checks.registry import REFUSALS, check
-from reconstruct.steps.s3_contacts.contacts import explore
-from scenes.embedded import embedded_recording
+from palpate.mechanics.errors import ContactError, PalpateError
+from palpate.mechanics.recording.recording import Recording, read_recording
+from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.registry import REFUSALS, check
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
+from palpate.scenes.embedded import embedded_recording
 
 from .faults import FAULTS
 from .quick_touches import varied

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from devices.codecs import haply, pid, spacemouse
-from mechanics.errors import DeviceError
+from palpate.devices.codecs import haply, pid, spacemouse
+from palpate.mechanics.errors import DeviceError
 
 from .mutations import MUTATIONS
 

@@ -33,10 +33,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Drag, print the ripples; returns {line: {least_n, most_n, ripple_rms, ripple_most}}."""
     from palpate.operations._shared import with_friction
-    from render.options import RenderOptions
-    from render.registry import create
-    from scenes.build import model_of
-    from scenes.scene import load_scene
+    from palpate.render.options import RenderOptions
+    from palpate.render.registry import create
+    from palpate.scenes.build import model_of
+    from palpate.scenes.scene import load_scene
 
     scene = load_scene(arguments.scene)
     renderer = create("fem", model_of(scene), with_friction(RenderOptions(), scene))
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _lines(renderer: Any, height_m: float) -> dict[str, np.ndarray]:
     """Name to (n, 3) m points of the contact surface, in the order of the drag."""
-    from mechanics.frames import tangents
+    from palpate.mechanics.frames import tangents
 
     model, arrays = renderer.model, renderer.contact.arrays
     up, foot = model.support.normal, model.support.point
@@ -147,8 +147,8 @@ def ripple(way: np.ndarray, force: np.ndarray) -> dict[str, float]:
 def _figure(path: str, renderer: Any, drawn: dict[str, Any], depth_m: float) -> None:
     from matplotlib import pyplot as plt
 
-    from mechanics.frames import tangents
-    from render.surface.felt_surface import local_stiffness
+    from palpate.mechanics.frames import tangents
+    from palpate.render.surface.felt_surface import local_stiffness
 
     arrays, up = renderer.contact.arrays, renderer.model.support.normal
     stiffness = local_stiffness(renderer, renderer.model.tool.tip_radius_m, depth_m)

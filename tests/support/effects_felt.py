@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.frames import tangents
-from mechanics.model.model import Model
-from mechanics.recording.recording import Recording
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import Recording
 
 DEPTH_M = 0.004
 SPEED_M_PER_S = 0.02

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from devices.registry import DeviceChoice
-from diagnose.apply import with_effects
-from mechanics.compliance.stored_compliance import load_or_condense
-from mechanics.model.files import read_model, write_model
-from mechanics.model.model import Model
-from mechanics.recording.recording import write_recording
+from palpate.devices.registry import DeviceChoice
+from palpate.diagnosis.apply import with_effects
+from palpate.mechanics.compliance.stored_compliance import load_or_condense
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import write_recording
 from palpate.servo.client import Servo
 
 from .effects_felt import Case, cases, felt_on, path_of
@@ -39,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Measure, print, return."""
-    from scenes.build import model_of
-    from scenes.scene import load_scene
+    from palpate.scenes.build import model_of
+    from palpate.scenes.scene import load_scene
 
     with tempfile.TemporaryDirectory() as temporary:
         work = Path(arguments.work or temporary)

@@ -17,13 +17,13 @@ from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector
 from skfem.helpers import ddot, div, sym_grad
 
 from benchmarks.timing import table
-from mechanics.compliance.patch import PatchSampler
-from mechanics.elastic.elasticity import LOCAL_BULK, lame_parameters
-from mechanics.elastic.pardiso import Pardiso, available
-from mechanics.elastic.solver import Solver
-from mechanics.errors import OptionError
-from mechanics.shape.box_mesh import box_mesh
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.elastic.elasticity import LOCAL_BULK, lame_parameters
+from palpate.mechanics.elastic.pardiso import Pardiso, available
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 KINDS = {
     "linear": (1, LOCAL_BULK),

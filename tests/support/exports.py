@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.contact.dent import dent_law
+from palpate.mechanics.contact.dent import dent_law
 from tests.support.containers import WRITERS, Content
 
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.recording.recording import Recording
-from reconstruct.steps.s3_contacts.contacts import explore
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
 Change = Callable[[Recording, np.random.Generator], Recording]
 

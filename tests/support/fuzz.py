@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError
 
 from .fuzz_cases import SHARES, TARGETS, Case, Sound
 from .fuzz_child import Child, Runner, Stranger

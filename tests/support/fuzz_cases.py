@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.model.files import read_model, write_model
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.recording.recording import read_recording, write_recording
-from mechanics.shape.box_mesh import box_mesh
 from palpate import cli
-from scenes.embedded import embedded_names, embedded_recording
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.recording.recording import read_recording, write_recording
+from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.scenes.embedded import embedded_names, embedded_recording
 
 from .device_bytes import MESSAGES
 from .mutations import EXTREMES, MUTATIONS, OF_SAMPLES, Mutation

@@ -21,7 +21,7 @@ from typing import Any, Protocol
 
 import psutil
 
-from palpate.child import module_command, module_environment
+from palpate.child import module_command
 
 CLONE = Path(__file__).resolve().parents[2]
 
@@ -125,7 +125,7 @@ class Stranger:
         with tempfile.TemporaryFile() as said:
             process = subprocess.Popen(
                 module_command("palpate", *argv), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                stderr=said, env=module_environment(),
+                stderr=said,
             )  # fmt: skip
             watch, ended = _Watch(process.pid, longest_s, most_bytes=MOST_BYTES + 1e9), ""
             while process.poll() is None and not ended:
@@ -177,7 +177,7 @@ def cpu_s(pid: int) -> float:
 
 def clone_environment(**variables: str) -> dict[str, str]:
     """`module_environment`, in which the clone's own `tests` are found too."""
-    found = module_environment(**variables)
+    found = dict(os.environ, **variables)
     return {**found, "PYTHONPATH": os.pathsep.join([found["PYTHONPATH"], str(CLONE)])}
 
 

@@ -33,13 +33,13 @@ import numpy as np
 import psutil
 
 from benchmarks.timing import table
-from mechanics.disk.scratch import temporary_prefix
-from mechanics.errors import OptionError, PalpateError
-from mechanics.model.files import read_model, write_model
-from mechanics.recording.files import recording_files
-from mechanics.recording.recording import read_recording, write_recording
-from palpate.child import module_command, module_environment
-from scenes.embedded import embedded_names, embedded_recording
+from palpate.child import module_command
+from palpate.mechanics.disk.scratch import temporary_prefix
+from palpate.mechanics.errors import OptionError, PalpateError
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.recording.files import recording_files
+from palpate.mechanics.recording.recording import read_recording, write_recording
+from palpate.scenes.embedded import embedded_names, embedded_recording
 
 from .fuzz_cases import PRESS, cube
 from .small_disk import SmallDisk
@@ -186,7 +186,7 @@ class _Place:
         _sound(folder / "sound")
         self.model = folder / "sound" / "block"
         self.jobs = _jobs(folder / "sound", self.out)
-        self._environment = module_environment(TMPDIR=str(self.scratch))
+        self._environment = dict(os.environ, TMPDIR=str(self.scratch))
 
     @classmethod
     @contextlib.contextmanager

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.laboratory.contact import SphereContact
-from scenes.laboratory.linear import LinearProblem
-from scenes.laboratory.mesh import QuadraticMesh, quadratic
-from scenes.laboratory.refine import refine
-from scenes.laboratory.solid import Material, Solid
-from scenes.laboratory.specimen import Fineness, Specimen, build
-from scenes.phantoms import Phantom
+from palpate.scenes.laboratory.contact import SphereContact
+from palpate.scenes.laboratory.linear import LinearProblem
+from palpate.scenes.laboratory.mesh import QuadraticMesh, quadratic
+from palpate.scenes.laboratory.refine import refine
+from palpate.scenes.laboratory.solid import Material, Solid
+from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
+from palpate.scenes.phantoms import Phantom
 
 
 def box(length: float, height: float, finest: float, growth: float) -> QuadraticMesh:

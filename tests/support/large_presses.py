@@ -17,19 +17,19 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.compliance.sites import touch_sites
-from mechanics.contact.touch import forces_at
-from mechanics.model.files import read_model
-from mechanics.model.model import Model
-from mechanics.recording.recording import Recording, read_recording
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.presses_on_model import presses_on
-from render.fem.renderer import FemRenderer
-from render.options import RenderOptions
-from render.replay import replay_recording, rms_n
-from scenes.laboratory.mesh import coarse_mesh
-from scenes.laboratory.specimen import Fineness, Specimen
-from scenes.phantoms import phantom
+from palpate.mechanics.compliance.sites import touch_sites
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.model.files import read_model
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import Recording, read_recording
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.presses_on_model import presses_on
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
+from palpate.render.replay import replay_recording, rms_n
+from palpate.scenes.laboratory.mesh import coarse_mesh
+from palpate.scenes.laboratory.specimen import Fineness, Specimen
+from palpate.scenes.phantoms import phantom
 
 from .laboratory_checks import straight_press
 

@@ -14,10 +14,10 @@ from functools import partial
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.compliance.sites import touch_sites, touch_solver
-from mechanics.contact.touch import touch_force
-from mechanics.elastic.solver import Solver
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.compliance.sites import touch_sites, touch_solver
+from palpate.mechanics.contact.touch import touch_force
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 from .sample_shapes import PLACES, sample_mesh, sample_places
 

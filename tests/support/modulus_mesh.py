@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.errors import ContactError
-from mechanics.recording.recording import read_recording
-from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-from reconstruct.steps.s5_mesh.meshing import MeshingOptions
-from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
-from scenes.embedded import embedded_recording
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.recording.recording import read_recording
+from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
+from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions
+from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperOptions
+from palpate.scenes.embedded import embedded_recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -14,10 +14,10 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri
 
-from mechanics.compliance.sites import touch_sites, touch_solver
-from mechanics.contact.touch import touch_force
-from mechanics.elastic.solver import Solver
-from mechanics.model.material import Ball
+from palpate.mechanics.compliance.sites import touch_sites, touch_solver
+from palpate.mechanics.contact.touch import touch_force
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.model.material import Ball
 
 from .sample_shapes import sample_mesh
 

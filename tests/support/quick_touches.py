@@ -15,15 +15,15 @@ import numpy as np
 
 from benchmarks.varied.draws import draw
 from benchmarks.varied.recorded import record
-from mechanics.recording.recording import Recording
-from scenes.laboratory.curves import Curve, PathJob
-from scenes.laboratory.specimen import Specimen
-from scenes.phantoms import Phantom
+from palpate.mechanics.recording.recording import Recording
+from palpate.scenes.laboratory.curves import Curve, PathJob
+from palpate.scenes.laboratory.specimen import Specimen
+from palpate.scenes.phantoms import Phantom
 
 
 def varied(seed: int, folder: Path) -> Recording:
     """The `seed`-th exploration of the variety, its files in `folder`; touches in closed form."""
-    with patch("scenes.laboratory.paths.curves", _curves):
+    with patch("palpate.scenes.laboratory.paths.curves", _curves):
         return record(draw(seed), folder).recording
 
 

@@ -9,9 +9,9 @@ import contextlib
 
 import numpy as np
 
-from mechanics.errors import MeshError
-from mechanics.shape.tetmesh import TetMesh
-from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
 
 # sample: rows of (azimuth or x in degrees or mm, height or y in mm, which face)
 PLACES = {

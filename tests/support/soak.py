@@ -20,11 +20,11 @@ from scipy.stats import theilslopes
 
 from benchmarks._servo_load import block_model
 from benchmarks.timing import table
-from devices.safety import LATCHING, SILENT, WORDS
-from mechanics.disk.scratch import cache_folder
-from mechanics.model.files import read_model, write_model
-from mechanics.model.model import Model
-from mechanics.recording.recording import read_recording
+from palpate.devices.safety import LATCHING, SILENT, WORDS
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import read_recording
 from palpate.servo import Servo, exploring_hand
 from palpate.servo.layout import DEADLINE, LATE, MISSED, STARTED, TICKS
 from palpate.window.session import TouchSession
@@ -272,7 +272,7 @@ class Continuity:
     """Commands tick by tick: how large, and how fast they rise or turn against what the slew limit allows."""
 
     def __init__(self, servo: Servo) -> None:
-        from devices.virtual_hand import SPEC
+        from palpate.devices.virtual_hand import SPEC
 
         self.clamp_n = SPEC.max_force_n
         self.ticks = self.forced = 0

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.contact.touch import forces_at
-from mechanics.elastic.solver import Solver
-from mechanics.errors import OptionError
-from mechanics.recording.recording import Recording, read_recording
+from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.recording.recording import Recording, read_recording
 
 from .sample_shapes import sample_mesh
 

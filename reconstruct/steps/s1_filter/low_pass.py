@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, savgol_filter, sosfiltfilt
 
-from mechanics.errors import OptionError
-from mechanics.options import option
-from mechanics.robust import read_columns, spread
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import option
+from palpate.mechanics.robust import read_columns, spread
 
 _EVEN = 1e-3
 """Of a step: less is rounding of the clock."""

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 from scipy.optimize import brentq
 
-from reconstruct.steps.s1_filter.low_pass import low_pass
+from palpate.reconstruction.steps.s1_filter.low_pass import low_pass
 
 _FALSE_PER_S = 1e-3
 """False touches in free motion, at most so often."""

@@ -10,19 +10,19 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import runs
-from reconstruct.shapes.points import in_its_plane
-from reconstruct.steps.s1_filter.fast_drift import (
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import runs
+from palpate.reconstruction.shapes.points import in_its_plane
+from palpate.reconstruction.steps.s1_filter.fast_drift import (
     crowd_median,
     follow_free_air,
     interpolation_error,
     passing,
     slow_part,
 )
-from reconstruct.steps.s1_filter.low_pass import low_pass_at, noise_gain, white_noise_std
-from reconstruct.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
-from reconstruct.steps.s1_filter.tool_weight import ToolWeight, tool_weight
+from palpate.reconstruction.steps.s1_filter.low_pass import low_pass_at, noise_gain, white_noise_std
+from palpate.reconstruction.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
+from palpate.reconstruction.steps.s1_filter.tool_weight import ToolWeight, tool_weight
 
 _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 from scipy.spatial.transform import Rotation
 
-from mechanics.recording.recording import Recording
-from reconstruct.steps.s1_filter.low_pass import low_pass_at
-from reconstruct.steps.s1_filter.noise_level import crowd_scale
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.steps.s1_filter.low_pass import low_pass_at
+from palpate.reconstruction.steps.s1_filter.noise_level import crowd_scale
 
 _SUBSAMPLE = 1200
 _TRIALS = 200

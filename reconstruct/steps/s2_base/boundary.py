@@ -7,9 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter1d, label
 
-from mechanics.errors import ContactError, OptionError
-from mechanics.options import option
-from reconstruct.shapes.points import FOOT, LEAST_STEPS, STEP_M, farthest_points, fit_plane, resampled
+from palpate.mechanics.errors import ContactError, OptionError
+from palpate.mechanics.options import option
+from palpate.reconstruction.shapes.points import (
+    FOOT,
+    LEAST_STEPS,
+    STEP_M,
+    farthest_points,
+    fit_plane,
+    resampled,
+)
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.errors import NoBaseError
-from mechanics.recording.segments import runs
-from reconstruct.shapes.points import FLAT, fit_plane
+from palpate.mechanics.errors import NoBaseError
+from palpate.mechanics.recording.segments import runs
+from palpate.reconstruction.shapes.points import FLAT, fit_plane
 
 _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
 _LEAST_PIECE = 2.0  # tip radii; less tells no plane

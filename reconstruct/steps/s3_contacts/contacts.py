@@ -11,25 +11,30 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mechanics.errors import OptionError
-from mechanics.options import option
-from mechanics.presses.cutting import FoundAround, FoundPresses, cut
-from mechanics.presses.repeats import SITE_M
-from mechanics.presses.table import Presses
-from mechanics.recording.recording import Recording
-from reconstruct.shapes.evidence import LEAST_TOUCHES
-from reconstruct.steps.s1_filter.low_pass import FilterOptions, low_pass_at, noise_gain, white_noise_std
-from reconstruct.steps.s1_filter.signals import Signals, filtered_of
-from reconstruct.steps.s2_base.boundary import Boundary, BoundaryOptions
-from reconstruct.steps.s3_contacts.cycles import free_air_seen
-from reconstruct.steps.s3_contacts.first_touch import (
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import option
+from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
+from palpate.mechanics.presses.repeats import SITE_M
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.shapes.evidence import LEAST_TOUCHES
+from palpate.reconstruction.steps.s1_filter.low_pass import (
+    FilterOptions,
+    low_pass_at,
+    noise_gain,
+    white_noise_std,
+)
+from palpate.reconstruction.steps.s1_filter.signals import Signals, filtered_of
+from palpate.reconstruction.steps.s2_base.boundary import Boundary, BoundaryOptions
+from palpate.reconstruction.steps.s3_contacts.cycles import free_air_seen
+from palpate.reconstruction.steps.s3_contacts.first_touch import (
     ContactSpans,
     FirstTouches,
     TouchRequest,
     find_first_touches,
 )
-from reconstruct.steps.s3_contacts.force_delay import Delay, force_delay
-from reconstruct.steps.s3_contacts.single_press import Touch
+from palpate.reconstruction.steps.s3_contacts.force_delay import Delay, force_delay
+from palpate.reconstruction.steps.s3_contacts.single_press import Touch
 
 METHODS = ("noise", "paper")
 _DELAY_ROUNDS = 4

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from reconstruct.steps.s1_filter.signals import Signals
-from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
-from reconstruct.steps.s3_contacts.single_press import Touch, initial_normal
+from palpate.reconstruction.steps.s1_filter.signals import Signals
+from palpate.reconstruction.steps.s3_contacts.contact_law import Loading, first_touches
+from palpate.reconstruction.steps.s3_contacts.single_press import Touch, initial_normal
 
 _STEP_RADII = 1 / 8
 """Of the tip: a way straight in or out so long without a change of the force is free air."""

@@ -12,16 +12,16 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.errors import ContactError, LoudAirError
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import ON_SUPPORT, Segment, runs
-from reconstruct.steps.s1_filter.signals import Filtered, Signals, stated_tracing
-from reconstruct.steps.s2_base.boundary import Boundary, BoundaryOptions, find_boundary
-from reconstruct.steps.s2_base.tracing_interval import find_interval
-from reconstruct.steps.s3_contacts.cycles import Piece, cycles, found_cycles
-from reconstruct.steps.s3_contacts.force_delay import Delay, delay_by_places
-from reconstruct.steps.s3_contacts.on_support import on_it, recognised, stated
-from reconstruct.steps.s3_contacts.single_press import Touch, fitted_touch, paper_touch
+from palpate.mechanics.errors import ContactError, LoudAirError
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import ON_SUPPORT, Segment, runs
+from palpate.reconstruction.steps.s1_filter.signals import Filtered, Signals, stated_tracing
+from palpate.reconstruction.steps.s2_base.boundary import Boundary, BoundaryOptions, find_boundary
+from palpate.reconstruction.steps.s2_base.tracing_interval import find_interval
+from palpate.reconstruction.steps.s3_contacts.cycles import Piece, cycles, found_cycles
+from palpate.reconstruction.steps.s3_contacts.force_delay import Delay, delay_by_places
+from palpate.reconstruction.steps.s3_contacts.on_support import on_it, recognised, stated
+from palpate.reconstruction.steps.s3_contacts.single_press import Touch, fitted_touch, paper_touch
 
 PAPER_THRESHOLD_N = 1.0
 _CLEAR = 1.5

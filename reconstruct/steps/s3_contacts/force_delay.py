@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.robust import biweight, spread_about_zero
-from reconstruct.steps.s1_filter.signals import Signals
-from reconstruct.steps.s3_contacts.contact_law import fit_rise
-from reconstruct.steps.s3_contacts.single_press import Touch
+from palpate.mechanics.robust import biweight, spread_about_zero
+from palpate.reconstruction.steps.s1_filter.signals import Signals
+from palpate.reconstruction.steps.s3_contacts.contact_law import fit_rise
+from palpate.reconstruction.steps.s3_contacts.single_press import Touch
 
 _TAIL_S = 0.15
 _AWAY_M = 0.004

@@ -11,14 +11,14 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.errors import ContactError
-from mechanics.presses.table import Presses
-from mechanics.recording.segments import Segment
-from mechanics.robust import spread_about_zero
-from reconstruct.steps.s2_base.boundary import Boundary
-from reconstruct.steps.s3_contacts.contact_law import contact_law, fit_offset, fit_rise
-from reconstruct.steps.s3_contacts.contacts import Exploration
-from reconstruct.steps.s3_contacts.on_support import on_it
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.segments import Segment
+from palpate.mechanics.robust import spread_about_zero
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s3_contacts.contact_law import contact_law, fit_offset, fit_rise
+from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
+from palpate.reconstruction.steps.s3_contacts.on_support import on_it
 
 SLIDE_RADII = 8.0
 """A contact whose tip wanders further than so many radii along the surface is no press: a drag within one is

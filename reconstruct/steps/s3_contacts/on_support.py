@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mechanics.presses.table import Presses
-from mechanics.recording.recording import Recording
-from mechanics.recording.segments import ON_SUPPORT
-from reconstruct.steps.s1_filter.signals import Signals
-from reconstruct.steps.s2_base.boundary import Boundary
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import ON_SUPPORT
+from palpate.reconstruction.steps.s1_filter.signals import Signals
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
 
 _SLID = 2.0
 """Tip radii: what stays within is pressed, what goes farther slides."""

@@ -15,15 +15,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.stats import theilslopes
 
-from mechanics.errors import ContactError
-from mechanics.presses.cutting import FoundAround, FoundPresses, cut
-from mechanics.presses.repeats import sites_of
-from mechanics.presses.table import Presses
-from mechanics.recording.recording import Recording
-from mechanics.robust import spread_about_zero
-from reconstruct.steps.s2_base.boundary import Boundary
-from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
-from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration
+from palpate.mechanics.errors import ContactError
+from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
+from palpate.mechanics.presses.repeats import sites_of
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.robust import spread_about_zero
+from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s3_contacts.contact_law import Loading, first_touches
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, Exploration
 
 _LEAST_NOISE = 1e-3
 """Of the greatest force: noise below this is not believed."""

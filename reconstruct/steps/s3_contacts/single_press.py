@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from reconstruct.steps.s1_filter.signals import Signals
-from reconstruct.steps.s3_contacts.contact_law import contact_law, fit_rise
+from palpate.reconstruction.steps.s1_filter.signals import Signals
+from palpate.reconstruction.steps.s3_contacts.contact_law import contact_law, fit_rise
 
 _LEAD_S = 0.15
 _FIT_SAMPLES = 250

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.presses.table import Presses
-from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
+from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.steps.s3_contacts.contact_law import Loading, first_touches
 
 _ALONG, _RADII = 0.2, 0.05
 """A press slides where, up to its peak, the tip goes along the surface by more than the first share of what

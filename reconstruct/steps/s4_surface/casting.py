@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from mechanics.shape.tetmesh import vertex_normals
-from mechanics.shape.true_shape import TrueShape
+from palpate.mechanics.shape.tetmesh import vertex_normals
+from palpate.mechanics.shape.true_shape import TrueShape
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.errors import SurfaceError
-from mechanics.frames import support_axes
-from mechanics.options import option
-from mechanics.progress import Progress, silent
-from mechanics.shape.true_shape import TrueShape
-from reconstruct.shapes.candidates import FITTED, HiddenOutlineError
-from reconstruct.shapes.choice import (
+from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.frames import support_axes
+from palpate.mechanics.options import option
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.true_shape import TrueShape
+from palpate.reconstruction.shapes.candidates import FITTED, HiddenOutlineError
+from palpate.reconstruction.shapes.choice import (
     best_drawn,
     held_out_error,
     reason,
@@ -24,18 +24,23 @@ from reconstruct.shapes.choice import (
     score,
     try_shapes,
 )
-from reconstruct.shapes.coarse_drawing import balanced
-from reconstruct.shapes.convex_bounds import gap_to_other_bound, hull_surface, tangent_surface, volume_bounds
-from reconstruct.shapes.drawing import draw
-from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence
-from reconstruct.shapes.fit import Seen
-from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
-from reconstruct.shapes.polyhedron import refine
+from palpate.reconstruction.shapes.coarse_drawing import balanced
+from palpate.reconstruction.shapes.convex_bounds import (
+    gap_to_other_bound,
+    hull_surface,
+    tangent_surface,
+    volume_bounds,
+)
+from palpate.reconstruction.shapes.drawing import draw
+from palpate.reconstruction.shapes.evidence import LEAST_TOUCHES, Evidence
+from palpate.reconstruction.shapes.fit import Seen
+from palpate.reconstruction.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
+from palpate.reconstruction.shapes.polyhedron import refine
 
 if TYPE_CHECKING:
     import trimesh
 
-    from reconstruct.steps.s3_contacts.contacts import Exploration
+    from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 
 SURFACES = ("auto", "hull", "tangent", "implicit", *FITTED)
 

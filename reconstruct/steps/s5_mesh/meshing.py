@@ -9,14 +9,14 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from mechanics.errors import MeshError
-from mechanics.options import option
-from mechanics.progress import Progress, silent
-from mechanics.shape.nearest import closest, distance, sample
-from mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
-from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
-from reconstruct.steps.s5_mesh.voxels import voxel_surface
+from palpate.mechanics.errors import MeshError
+from palpate.mechanics.options import option
+from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.nearest import closest, distance, sample
+from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
+from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
+from palpate.reconstruction.steps.s5_mesh.voxels import voxel_surface
 
 _SAMPLES = 4000
 _TRIES = 3

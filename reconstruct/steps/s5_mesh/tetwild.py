@@ -13,9 +13,9 @@ import sys
 
 import numpy as np
 
-from mechanics.disk.reading import reading
-from mechanics.disk.writing import temporary_folder
-from mechanics.errors import MeshError
+from palpate.mechanics.disk.reading import reading
+from palpate.mechanics.disk.writing import temporary_folder
+from palpate.mechanics.errors import MeshError
 
 MOST_TETRAHEDRA = 150_000
 """Beyond it the factorised stiffness of quadratic elements takes more memory than a desktop has."""

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from mechanics.errors import SurfaceError
+from palpate.mechanics.errors import SurfaceError
 
 _LEFT_OUT = 0.9
 """Share of the contour's triangles that the mesher does without: flat places need few."""

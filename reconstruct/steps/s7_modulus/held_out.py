@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.contact.touch import forces_at
-from mechanics.errors import ModelError
-from mechanics.model.one_d_laws import LAWS, RIVALS, Fits, Law, forces_of, spread_law
-from mechanics.presses.table import Presses
-from reconstruct.steps.s6_one_d.one_d import columns, fit_robust, low_passed
-from reconstruct.steps.s7_modulus.modulus import ModulusFit, combine
-from reconstruct.steps.s7_modulus.press_fit import touched_as_fitted
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.errors import ModelError
+from palpate.mechanics.model.one_d_laws import LAWS, RIVALS, Fits, Law, forces_of, spread_law
+from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.steps.s6_one_d.one_d import columns, fit_robust, low_passed
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, combine
+from palpate.reconstruction.steps.s7_modulus.press_fit import touched_as_fitted
 
 _BLOCK_S = 0.004
 BETTER = 0.95

@@ -16,13 +16,13 @@ import numpy as np
 from scipy.stats import t as student
 from scipy.stats import theilslopes
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.contact.depth_factors import DepthFactors
-from mechanics.errors import OptionError
-from mechanics.options import EXACT, option
-from mechanics.presses.table import Presses
-from mechanics.robust import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
-from reconstruct.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.contact.depth_factors import DepthFactors
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import EXACT, option
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.robust import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
+from palpate.reconstruction.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
 LAWS = ("linear", "neo-hookean", "sphere", "hertz")
 AUTO_LAWS = ("linear", "neo-hookean")

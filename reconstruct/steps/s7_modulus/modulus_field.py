@@ -14,10 +14,10 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.compliance.field_response import shares_of, tips_of
-from mechanics.compliance.pressed_places import Places, places_at
-from mechanics.compliance.sites import TouchSites
-from mechanics.compliance.smooth_field import (
+from palpate.mechanics.compliance.field_response import shares_of, tips_of
+from palpate.mechanics.compliance.pressed_places import Places, places_at
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.compliance.smooth_field import (
     Estimate,
     Shares,
     SmoothField,
@@ -28,14 +28,14 @@ from mechanics.compliance.smooth_field import (
     places_of,
     views_of,
 )
-from mechanics.compliance.solved_fields import far_in_field
-from mechanics.contact.edges import edge_law
-from mechanics.contact.touch import forces_at
-from mechanics.effects import stiffness_field
-from mechanics.model.model import Model
-from mechanics.options import option
-from mechanics.presses.table import Presses
-from reconstruct.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
+from palpate.mechanics.compliance.solved_fields import far_in_field
+from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.effects import stiffness_field
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.options import option
+from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
 LEAST_GAIN = 4.0
 """Log likelihood by which a field must be likelier than places that scatter at random ..."""

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.elastic.elasticity import stiffness
-from mechanics.elastic.solver import Solver
-from mechanics.errors import ContactError, OptionError
-from mechanics.options import option
-from mechanics.presses.table import Presses
-from mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.elastic.elasticity import stiffness
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import ContactError, OptionError
+from palpate.mechanics.options import option
+from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.shape.tetmesh import TetMesh
 
 
 @dataclass(frozen=True)

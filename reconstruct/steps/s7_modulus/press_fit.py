@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechanics.compliance.sites import TouchSites
-from mechanics.contact.touch import forces_at
-from mechanics.presses.table import Presses
+from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.presses.table import Presses
 
 _BLOCK_S = 0.004
 _LEAD_S = 0.03

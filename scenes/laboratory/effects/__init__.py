@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from mechanics.errors import OptionError
-from mechanics.names import unknown
-from scenes.laboratory.effects import contact, instrument, solid, stiffness_field
-from scenes.laboratory.effects.base import Bench, Effect, Readings
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.names import unknown
+from palpate.scenes.laboratory.effects import contact, instrument, solid, stiffness_field
+from palpate.scenes.laboratory.effects.base import Bench, Effect, Readings
 
 REGISTRY: dict[str, Effect] = {
     effect.name: effect

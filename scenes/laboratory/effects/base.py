@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from scenes.laboratory.motion import Motion
-from scenes.laboratory.presses import Touch
-from scenes.laboratory.specimen import Specimen
-from scenes.phantoms import Phantom
+from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.specimen import Specimen
+from palpate.scenes.phantoms import Phantom
 
 Parameters = Mapping[str, Any]
 

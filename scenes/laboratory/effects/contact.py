@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.signal import fftconvolve
 
-from scenes.laboratory.effects.base import Bench, Effect, Parameters
-from scenes.laboratory.motion import Motion
-from scenes.laboratory.paths import SIDEWAYS, WAY_OUT
-from scenes.laboratory.tracing import RATE_HZ
+from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters
+from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_OUT
+from palpate.scenes.laboratory.tracing import RATE_HZ
 
 
 def relaxed(force: np.ndarray, g: list[float], tau_s: list[float]) -> np.ndarray:

@@ -8,8 +8,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from scenes.laboratory.effects.base import Bench, Effect, Parameters, Readings, unit
-from scenes.laboratory.tracing import RATE_HZ
+from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters, Readings, unit
+from palpate.scenes.laboratory.tracing import RATE_HZ
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 """m/s^2, device frame: down is -z whatever the support's tilt."""

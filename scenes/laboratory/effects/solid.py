@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import OptionError
-from scenes.laboratory.effects.base import Bench, Effect, Parameters
-from scenes.laboratory.specimen import Specimen, ball
-from scenes.laboratory.surface import Surface
-from scenes.phantoms import Phantom
+from palpate.mechanics.errors import OptionError
+from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters
+from palpate.scenes.laboratory.specimen import Specimen, ball
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.phantoms import Phantom
 
 
 def _finite(strength: float, bench: Bench) -> dict[str, Any]:

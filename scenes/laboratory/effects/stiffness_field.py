@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from scenes.laboratory.effects.base import Bench, Effect, Parameters
-from scenes.laboratory.field import Field
-from scenes.laboratory.specimen import Specimen
+from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters
+from palpate.scenes.laboratory.field import Field
+from palpate.scenes.laboratory.specimen import Specimen
 
 LOG_SD = 0.35
 """Standard deviation of ln E of strength 1: nine places in ten within a factor of 1.8 of the median."""

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import palpate.show  # noqa: F401  who says and draws results
-from diagnose.compare.before_after import Side, changes
-from mechanics.model.material import Material
-from mechanics.model.model import Model, Support, Tool
-from mechanics.presses.making import of_places
-from mechanics.shape.box_mesh import box_mesh
 from palpate import cli
+from palpate.diagnosis.compare.before_after import Side, changes
+from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.presses.making import of_places
+from palpate.mechanics.shape.box_mesh import box_mesh
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from benchmarks._tissue import tissue
-from diagnose.compare.comparison import Along, CompareOptions, compare_presses
-from diagnose.compare.models import HOMOGENEOUS, RIVALS, as_touched
-from mechanics.compliance import solved_fields
-from mechanics.presses.making import PathErrors, of_paths
+from palpate.diagnosis.compare.comparison import Along, CompareOptions, compare_presses
+from palpate.diagnosis.compare.models import HOMOGENEOUS, RIVALS, as_touched
+from palpate.mechanics.compliance import solved_fields
+from palpate.mechanics.presses.making import PathErrors, of_paths
+from palpate.reconstruction.steps.s7_modulus.modulus_field import asked_for, fit_field
 from palpate.show.comparison import lines
-from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field
 
 UP = np.array([0.0, 0.0, 1.0])
 

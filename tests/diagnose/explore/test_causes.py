@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.explore.causes import NONE, SIZES, Causes, judge
-from diagnose.explore.state import cause_goal
-from diagnose.explore.weighing import Weighing
+from palpate.diagnosis.explore.causes import NONE, SIZES, Causes, judge
+from palpate.diagnosis.explore.state import cause_goal
+from palpate.diagnosis.explore.weighing import Weighing
 
 CAUSES, FORMS, OWN, READINGS, LOOKS = 6, 2, 3, 30, 20
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from diagnose.explore.candidates import Known, ReachOptions, after_touch, modulus_after, press_depth
-from diagnose.explore.explorer import Explorer
-from diagnose.explore.goals import GoalOptions, GoalState, surface_error
-from diagnose.explore.segments import Instrument, Segment, join
-from mechanics.errors import OptionError, RecordingError
+from palpate.diagnosis.explore.candidates import Known, ReachOptions, after_touch, modulus_after, press_depth
+from palpate.diagnosis.explore.explorer import Explorer
+from palpate.diagnosis.explore.goals import GoalOptions, GoalState, surface_error
+from palpate.diagnosis.explore.segments import Instrument, Segment, join
+from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.robot.protocol import segment_of, serve
 
 from ...reconstruct.exploration_of_cylinder import explore_cylinder
@@ -206,7 +206,7 @@ def test_the_robots_example_runs_against_the_laboratory(tmp_path):
 
 
 def test_a_place_that_was_asked_for_and_not_reached_is_not_asked_for_again():
-    from diagnose.explore.candidates import _not_in_vain
+    from palpate.diagnosis.explore.candidates import _not_in_vain
 
     vertices = np.column_stack([np.linspace(0, 0.1, 11), np.zeros(11), np.zeros(11)])
     rows = np.arange(11)
@@ -227,12 +227,12 @@ def test_touches_that_were_off_widen_what_a_surface_says_of_itself():
 
 
 def test_a_robot_in_the_laboratory_presses_as_fast_and_as_long_as_it_is_told():
-    from scenes.laboratory.hand import HandOptions
-    from scenes.laboratory.motion import _one_touch
-    from scenes.laboratory.paths import WAY_IN
-    from scenes.laboratory.presses import Touch
-    from scenes.laboratory.surface import Surface
-    from scenes.phantoms import phantom
+    from palpate.scenes.laboratory.hand import HandOptions
+    from palpate.scenes.laboratory.motion import _one_touch
+    from palpate.scenes.laboratory.paths import WAY_IN
+    from palpate.scenes.laboratory.presses import Touch
+    from palpate.scenes.laboratory.surface import Surface
+    from palpate.scenes.phantoms import phantom
 
     block = phantom("block")
     surface = Surface(1e3 * block.vertices, block.faces)

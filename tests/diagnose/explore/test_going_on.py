@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.explore.segments import Instrument, Segment, join, split
-from mechanics.errors import RecordingError
-from mechanics.recording.recording import read_recording, write_recording
-from mechanics.recording.segments import Segment as Stretch
+from palpate.diagnosis.explore.segments import Instrument, Segment, join, split
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.recording.recording import read_recording, write_recording
+from palpate.mechanics.recording.segments import Segment as Stretch
 
 
 def _rows(kind, n=400, at=0.0):

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.explore.causes import NONE, Causes
-from diagnose.explore.modulus import modulus_beside
+from palpate.diagnosis.explore.causes import NONE, Causes
+from palpate.diagnosis.explore.modulus import modulus_beside
 
 PLAIN = SimpleNamespace(modulus_pa=20e3, ci95_pa=(20e3 * np.exp(-0.1), 20e3 * np.exp(0.1)))
 

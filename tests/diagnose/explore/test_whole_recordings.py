@@ -6,16 +6,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.explore.causes import NONE, causes_of
-from diagnose.explore.explorer import Explorer
-from diagnose.explore.goals import GoalOptions
-from diagnose.search.starts import REACH_M
-from mechanics.recording.recording import read_recording
+from palpate.diagnosis.explore.causes import NONE, causes_of
+from palpate.diagnosis.explore.explorer import Explorer
+from palpate.diagnosis.explore.goals import GoalOptions
+from palpate.diagnosis.search.starts import REACH_M
+from palpate.mechanics.recording.recording import read_recording
 
 
 @pytest.mark.slow
 def test_the_final_answer_is_reconstructions_within_their_intervals(shared_recordings):
-    from reconstruct.pipeline import reconstruct
+    from palpate.reconstruction.pipeline import reconstruct
 
     recording = read_recording(shared_recordings / "silicone-1-cylinder.toml")
     explorer = Explorer.going_on(recording, GoalOptions(most=60))

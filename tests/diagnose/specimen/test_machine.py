@@ -8,11 +8,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.specimen.bench import Curve
-from diagnose.specimen.material import material_of
-from diagnose.specimen.result import MachineTests, Material
-from diagnose.specimen.yielding import machine_of, way_of
-from mechanics.contact.dent import dent_law
+from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.specimen.material import material_of
+from palpate.diagnosis.specimen.result import MachineTests, Material
+from palpate.diagnosis.specimen.yielding import machine_of, way_of
+from palpate.mechanics.contact.dent import dent_law
 from palpate.show.material import as_json, in_words, lines
 
 RADIUS = 0.005

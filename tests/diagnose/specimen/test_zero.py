@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from diagnose.specimen.bench import Curve
-from diagnose.specimen.material import material_of
-from diagnose.specimen.result import MachineTests, Material
-from diagnose.specimen.zero import late_contact
-from mechanics.contact.dent import dent_law
+from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.specimen.material import material_of
+from palpate.diagnosis.specimen.result import MachineTests, Material
+from palpate.diagnosis.specimen.zero import late_contact
+from palpate.mechanics.contact.dent import dent_law
 from palpate.show.material import lines
 
 RADIUS, MODULUS = 0.005, 3e4

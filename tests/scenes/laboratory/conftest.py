@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenes.laboratory import session as module
-from scenes.laboratory.paths import Leg, TouchForce
+from palpate.scenes.laboratory import session as module
+from palpate.scenes.laboratory.paths import Leg, TouchForce
 
 
 @pytest.fixture

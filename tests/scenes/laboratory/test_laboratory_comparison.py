@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks._laboratory_comparison import SHARES, Press, by_depth, cylinder_shape, recorded_presses
-from scenes.laboratory.simulate import SimulateOptions, simulate
-from scenes.phantoms import phantom
+from palpate.scenes.laboratory.simulate import SimulateOptions, simulate
+from palpate.scenes.phantoms import phantom
 
 
 def test_presses_of_a_recording_begin_where_the_known_shape_is_met(springs) -> None:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from mechanics.errors import SceneError, SurfaceError
-from scenes.laboratory.hand import HandOptions
-from scenes.laboratory.presses import FLOOR_MM, RIM_MM, press_set
-from scenes.laboratory.surface import Surface
-from scenes.laboratory.tracing import foot_path, trace
-from scenes.phantoms import PHANTOMS, phantom
+from palpate.mechanics.errors import SceneError, SurfaceError
+from palpate.scenes.laboratory.hand import HandOptions
+from palpate.scenes.laboratory.presses import FLOOR_MM, RIM_MM, press_set
+from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.tracing import foot_path, trace
+from palpate.scenes.phantoms import PHANTOMS, phantom
 
 VOLUMES_CM3 = {
     "cylinder": np.pi * 4**2 * 8,

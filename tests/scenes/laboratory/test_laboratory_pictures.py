@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial import cKDTree
 
 from palpate.cli import main
+from palpate.scenes.laboratory.simulate import SimulateOptions, simulate
+from palpate.scenes.phantoms import phantom
 from palpate.show.simulation import PRESSES_SHOWN, simulation_figure, view
-from scenes.laboratory.simulate import SimulateOptions, simulate
-from scenes.phantoms import phantom
 
 
 def _figure(effects: dict[str, float]):

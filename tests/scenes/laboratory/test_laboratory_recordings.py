@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.errors import OptionError, RecordingError
-from mechanics.recording.recording import read_recording
 from palpate.cli import main
+from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.recording.recording import read_recording
 from palpate.operations.simulate import effects_from
-from scenes.laboratory.effects import REGISTRY, UNNAMED
-from scenes.laboratory.effects.contact import relaxed
-from scenes.laboratory.sealing import opened
-from scenes.laboratory.session import Staging
-from scenes.laboratory.simulate import SimulateOptions, simulate
-from scenes.laboratory.truth import size_of
-from scenes.phantoms import phantom
+from palpate.scenes.laboratory.effects import REGISTRY, UNNAMED
+from palpate.scenes.laboratory.effects.contact import relaxed
+from palpate.scenes.laboratory.sealing import opened
+from palpate.scenes.laboratory.session import Staging
+from palpate.scenes.laboratory.simulate import SimulateOptions, simulate
+from palpate.scenes.laboratory.truth import size_of
+from palpate.scenes.phantoms import phantom
 
 CONTRACT = set(
     "finite_strain strain_stiffening viscoelasticity power_law_relaxation poroelasticity "

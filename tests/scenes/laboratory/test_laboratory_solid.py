@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from mechanics.contact.dent import dent_law
-from scenes.laboratory.contact import SphereContact
-from scenes.laboratory.effects.contact import relaxed
-from scenes.laboratory.linear import LinearProblem
-from scenes.laboratory.refine import boundary_faces
-from scenes.laboratory.solid import Material, Solid
-from scenes.laboratory.solver import Mixing, Problem
-from scenes.laboratory.specimen import Fineness, Specimen
-from scenes.phantoms import phantom
+from palpate.mechanics.contact.dent import dent_law
+from palpate.scenes.laboratory.contact import SphereContact
+from palpate.scenes.laboratory.effects.contact import relaxed
+from palpate.scenes.laboratory.linear import LinearProblem
+from palpate.scenes.laboratory.refine import boundary_faces
+from palpate.scenes.laboratory.solid import Material, Solid
+from palpate.scenes.laboratory.solver import Mixing, Problem
+from palpate.scenes.laboratory.specimen import Fineness, Specimen
+from palpate.scenes.phantoms import phantom
 
 from ...support.laboratory_checks import (
     box,

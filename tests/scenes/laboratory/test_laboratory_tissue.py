@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.effects.jkr_adhesion import LAW as STICKY
-from mechanics.effects.jkr_adhesion import _set as set_adhesion
-from mechanics.effects.jkr_adhesion import edge_share
-from mechanics.effects.poroelasticity import LAW as POROUS
-from mechanics.effects.power_law_relaxation import prony_terms
-from mechanics.effects.settings import Touch
-from mechanics.effects.viscoelasticity import LAW as PRONY
-from scenes.laboratory.effects import effect
-from scenes.laboratory.motion import Motion
-from scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
-from scenes.laboratory.tracing import RATE_HZ
+from palpate.mechanics.effects.jkr_adhesion import LAW as STICKY
+from palpate.mechanics.effects.jkr_adhesion import _set as set_adhesion
+from palpate.mechanics.effects.jkr_adhesion import edge_share
+from palpate.mechanics.effects.poroelasticity import LAW as POROUS
+from palpate.mechanics.effects.power_law_relaxation import prony_terms
+from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.viscoelasticity import LAW as PRONY
+from palpate.scenes.laboratory.effects import effect
+from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
+from palpate.scenes.laboratory.tracing import RATE_HZ
 
 RADIUS, E_STAR, DEPTH_MM = 5e-3, 25e3, 3.0
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scenes.laboratory.contact import SphereContact
-from scenes.laboratory.effects import effect
-from scenes.laboratory.effects.stiffness_field import LOG_SD, field_of
-from scenes.laboratory.field import log_ratio
-from scenes.laboratory.specimen import Fineness, Specimen, build
-from scenes.phantoms import phantom
+from palpate.scenes.laboratory.contact import SphereContact
+from palpate.scenes.laboratory.effects import effect
+from palpate.scenes.laboratory.effects.stiffness_field import LOG_SD, field_of
+from palpate.scenes.laboratory.field import log_ratio
+from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
+from palpate.scenes.phantoms import phantom
 
 BLOCK = phantom("block")
 
@@ -63,7 +63,7 @@ def _force(field, cache, tip: float) -> float:
     point, up = np.array([0.0, 0.0, 1e3 * BLOCK.height_m]), np.array([0.0, 0.0, 1.0])
     specimen = replace(Specimen(), field=field)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("scenes.laboratory.touching.SphereContact", stiffer)
+        patch.setattr("palpate.scenes.laboratory.touching.SphereContact", stiffer)
         problem = build(
             BLOCK, specimen, point, travel=0.5, fineness=Fineness(finest=6.0, growth=1.0), cache=cache
         )

@@ -1,0 +1,182 @@
+"""The page as one HTML file: template, styles and scripts beside this file, and the contents of one model."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import json
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from palpate.exporting.page.contents import contents, one_d_renderer, press_word
+from palpate.exporting.subject import Subject
+from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.progress import Progress, silent
+from palpate.render.fem.renderer import FemRenderer
+from palpate.render.press import Stroke, press
+from palpate.render.scene import TouchScene, in_the_air
+from palpate.show.object3d import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
+
+SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
+_ROWS = 12
+_VIRTUAL = (
+    " This object is a known shape of a known modulus that nobody touched: its presses are virtual, computed "
+    "by the same law."
+)
+
+
+def write(
+    path: Path, subject: Subject, *, opens: bool = False, progress: Progress = silent
+) -> tuple[str, ...]:
+    """Write the page; what it cannot say. opens: on the subject's press, unless a link names another one."""
+    renderer = FemRenderer(subject.model, progress=progress)
+    first = [*subject.top.tolist(), subject.depth_m] if opens else None
+    path.write_text(page_of(renderer, first, progress), encoding="utf-8")
+    return (f"no {', no '.join(left_out(subject.model))}",)
+
+
+def page_of(
+    renderer: FemRenderer,
+    opens: list[float] | None = None,
+    progress: Progress = silent,
+    *,
+    title: str | None = None,
+) -> str:
+    """The whole page of a model's finite-element renderer. opens: x, y, z, depth, m, of a press that it opens
+    on. title: the model's name unless given."""
+    block, about = contents(renderer, progress)
+    model = renderer.model
+    about["opens"] = opens
+    about["view"] = [float(np.radians(AZIMUTH_DEG)), float(np.radians(ELEVATION_DEG))]
+    table_title, table = _table(renderer)
+    filled = {
+        "name": html.escape(title or model.name),
+        "summary": _summary(model),
+        "style": file("page.css"),
+        "picture": _picture(model),
+        "one_d": '<li><i class="one-d"></i>interpolated 1D model</li>' if about["one_d"] else "",
+        "table_title": table_title,
+        "table": table,
+        "word": press_word(model),
+        "words": _words(renderer),
+        "left_out": html.escape("; ".join(left_out(model))),
+        "about": json.dumps(about, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
+        "block": block.base64(),
+        "scripts": "\n".join(file(f"{name}.js") for name in SCRIPTS),
+    }
+    page = file("page.html")
+    for name, value in filled.items():
+        page = page.replace("{{" + name + "}}", value)
+    return page.rstrip("\n")
+
+
+@cache
+def file(name: str) -> str:
+    """A part of the page, as it stands beside this module."""
+    return files("palpate.exporting.page").joinpath(name).read_text(encoding="utf-8")
+
+
+def left_out(model: Model) -> tuple[str, ...]:
+    """What a page does not show of a model, in words."""
+    memory = [name for name in model.effects if effect(name).law is not None]
+    remembers = f" ({', '.join(memory)}: felt as at 10 mm/s on the way in)" if memory else ""
+    return (
+        "second tip",
+        f"memory of how fast and how often one pressed{remembers}",
+        "support beside the object",
+        "depth beyond its tables",
+    )
+
+
+def _summary(model: Model) -> str:
+    low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
+    interval = f" ({low:.1f} to {high:.1f})" if np.isfinite([low, high]).all() else ""
+    return (
+        f"Soft object, {model.material.young_modulus_pa / 1e3:.1f} kPa{interval}, felt with a tip of "
+        f"{1e3 * model.tool.tip_radius_m:.3g} mm radius"
+    )
+
+
+def _words(renderer: FemRenderer) -> str:
+    friction = float(renderer.parameters.friction[0])
+    slides = f"it slides at a friction of {friction:.3g}" if np.isfinite(friction) else "it never slides"
+    return (
+        "Forces are read from tables that the program's own finite-element renderer made: straight and "
+        "slanting presses at every vertex of the surface, at 10 mm/s. Between vertices and depths the page "
+        f"interpolates; the tip sticks, and {slides}. The band holds the 95 % interval of the modulus and "
+        "the error of the law. The shape that is drawn moves by the strongest modes of the compliance; "
+        "the dent right under the tip is drawn so that it clears the ball."
+        + (_VIRTUAL if press_word(renderer.model) == "virtual" else "")
+    )
+
+
+def _picture(model: Model) -> str:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+    draw_touched(figure.subplots(), model)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=100, transparent=True)
+    return f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+
+
+def _table(renderer: FemRenderer) -> tuple[str, str]:
+    """Title and rows: some of the model's own presses, as they were, by finite elements and in 1D."""
+    model = renderer.model
+    presses, beside = model.presses, one_d_renderer(model)
+    chosen = np.unique(np.linspace(0, len(presses) - 1, min(len(presses), _ROWS)).round().astype(int))
+    word = press_word(model)
+    head = (
+        "press",
+        "",
+        "depth [mm]",
+        f"{word} [N]",
+        "finite elements [N]",
+        "1D model [N]",
+        "at x, y, z [mm]",
+    )
+    rows = []
+    scenes = [in_the_air(each) if each is not None else None for each in (renderer, beside)]
+    for i in chosen:
+        at, normal, depth = presses.point[i], presses.normal[i], float(presses.depth_m[i])
+        forces = [_pressed(each, at, normal, depth) for each in scenes]
+        place = ",".join(f"{v:.6f}" for v in at)
+        cells = [str(i + 1), f'<button data-at="{place}">press it</button>', f"{1e3 * depth:.1f}"]
+        cells += [_number(v) for v in (_peak(model, int(i)), *forces)]
+        rows.append([*cells, ", ".join(f"{v:.0f}" for v in (1e3 * at).round() + 0.0)])
+    if not rows:
+        return "Measured presses: none", "<p>This model was not made from presses.</p>"
+    top = "".join(f'<th scope="col">{text}</th>' for text in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
+    fewer = len(rows) < len(presses)
+    title = f"{len(rows)} of {len(presses)} {word} presses" if fewer else f"The {word} presses"
+    return title, f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _pressed(scene: TouchScene | None, at: np.ndarray, normal: np.ndarray, depth_m: float) -> float:
+    """Normal force, N, of a straight press; NaN where there is no scene or it misses."""
+    if scene is None:
+        return float("nan")
+    try:
+        curve = press(scene, at, -normal, Stroke(depth_m, 0.01))
+    except OptionError:
+        return float("nan")
+    return float(curve.force_at(depth_m) @ normal)
+
+
+def _peak(model: Model, i: int) -> float:
+    """Greatest measured force along the normal of a press, N; NaN where no samples are kept."""
+    if not model.presses.sampled:
+        return float("nan")
+    push = model.presses.net.push[model.presses.parts[i]]
+    return float(push.max()) if len(push) else float("nan")
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "–"

@@ -1,0 +1,125 @@
+"""Which programs a model can be written for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.exporting import abaqus, gmsh, mujoco, scripts, sofa, stl, usd
+from palpate.exporting.subject import Subject, subject_of
+from palpate.mechanics.disk.surface_files import UNITS
+from palpate.mechanics.disk.writing import Kind, atomic_file
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.progress import Progress, silent
+
+Writer = Callable[[Path, Subject], tuple[str, ...]]
+
+
+def _page(path: Path, subject: Subject, **more: Any) -> tuple[str, ...]:
+    """`palpate.exporting.page.document.write`, whose libraries the help of the command need not load."""
+    from palpate.exporting.page import document
+
+    return document.write(path, subject, **more)
+
+
+@dataclass(frozen=True)
+class Format:
+    """A program's file: its suffix, its writer, which returns what the format cannot say, how such a file
+    begins, and what to do with it ({path}: the file; commands between backticks)."""
+
+    suffix: str
+    write: Writer
+    kind: Kind
+    opened_by: str
+
+
+_SCRIPT = Kind("a script of palpate export", (b"# Palpate model",))
+FORMATS = {
+    "mujoco": Format(
+        ".xml",
+        mujoco.write,
+        Kind("a scene of palpate export", (b"<!-- Palpate model",)),
+        "look at it: `python -m mujoco.viewer --mjcf={path}`",
+    ),
+    "sofa": Format(
+        ".scn",
+        sofa.write,
+        Kind("a scene of palpate export", (b"<?xml",), holds=b"<!-- Palpate model"),
+        "run it: `runSofa {path}`",
+    ),
+    "abaqus": Format(
+        ".inp",
+        abaqus.write,
+        Kind("a deck of palpate export", (b"*Heading\n Palpate model",)),
+        "solve it with Abaqus or CalculiX: the reference point's force is the press",
+    ),
+    "gmsh": Format(
+        ".msh",
+        gmsh.write,
+        Kind("a mesh of palpate export", (b"$MeshFormat",), holds=b"young_modulus_pa"),
+        "look at it: `gmsh {path}`",
+    ),
+    "page": Format(
+        ".html",
+        _page,
+        Kind("a page of palpate export", (b"<!doctype html>",), holds=b"Made by palpate"),
+        "open {path} in any browser, and press",
+    ),
+    "usd": Format(
+        ".usda",
+        usd.write,
+        Kind("a stage of palpate export", (b"#usda 1.0",), holds=b"Palpate model"),
+        "look at it: `usdview {path}`",
+    ),
+    "newton": Format(".py", scripts.write_newton, _SCRIPT, "press it: `python {path}`"),
+    "drake": Format(".py", scripts.write_drake, _SCRIPT, "press it: `python {path}`"),
+    "stl": Format(
+        ".stl",
+        stl.write,
+        Kind("an STL of palpate export", (stl.HEADER,)),
+        "open {path} in any program that draws or prints shapes",
+    ),
+}
+
+
+def write(
+    model: Model,
+    to: str,
+    path: Path | str,
+    *,
+    at: np.ndarray | None = None,
+    depth_m: float | None = None,
+    unit: str = "m",
+    progress: Progress = silent,
+) -> tuple[str, ...]:
+    """Write a model for another program; what its format cannot say, one line each.
+
+    at, depth_m: of the press in the scene (see `subject_of`). unit: of an STL's lengths. progress: of a page,
+    whose tables take some seconds. Raises OptionError for a program or suffix that does not fit.
+    """
+    if to not in FORMATS:
+        raise OptionError(f"--to is '{to}'; allowed are {', '.join(FORMATS)}")
+    program = FORMATS[to]
+    path = Path(path)
+    if path.suffix.lower() != program.suffix:
+        raise OptionError(f"'{path}' must end in {program.suffix} for {to}")
+    if unit not in UNITS or (unit != "m" and to != "stl"):
+        allowed = ", ".join(UNITS) if to == "stl" else "m: the other formats are in metres"
+        raise OptionError(f"--unit is '{unit}'; allowed are {allowed}")
+    if depth_m is not None and not depth_m > 0:
+        raise OptionError(f"--depth is {depth_m} m; it must be greater than 0")
+    subject = subject_of(model, at, depth_m)
+    asked = at is not None or depth_m is not None
+    more: dict[str, dict[str, Any]] = {"stl": {"unit": unit}, "page": {"opens": asked, "progress": progress}}
+    chosen = partial(program.write, **more.get(to, {}))
+    with atomic_file(path, program.kind) as temporary:
+        notes = chosen(temporary, subject)
+    felt = to == "page"  # its tables are of the renderer, which renders them
+    lost = [f"not in the file: {', '.join(subject.left_out)}"] if subject.left_out and not felt else []
+    return (*notes, *lost)

@@ -1,0 +1,156 @@
+"""What a machine's curves mean where nothing says it: which way is in, which load pushes, and the units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from palpate.diagnosis.specimen.bench import Curve
+from palpate.importing.mapping import Column
+from palpate.importing.meaning import (
+    Reading,
+    Unclear,
+    best,
+    press_scores,
+)
+from palpate.importing.units import SI, without_unit
+from palpate.mechanics.errors import ContactError, RecordingError
+
+_INTO = ("depth", "indentation", "indent", "compression", "travel", "penetration")
+_OUT = ("height", "gap", "toolgap")
+_NAMED, _USUAL = float(np.log(6.0)), float(np.log(2.0))
+"""What a name tells of a direction, and that z points up, travel down, load into the sample (nats)."""
+_DEEPEST_RADII = 20.0
+_LENGTH_FACTOR = 4.0
+_USUAL_E, _E_FACTOR = 2e4, 20.0
+
+
+@dataclass(frozen=True)
+class RawCurves:
+    """One table in SI, signs as in the file. t None: no column of time."""
+
+    path: Path
+    t: np.ndarray
+    position: np.ndarray
+    load: np.ndarray
+    columns: Mapping[str, Column]
+
+
+def signs_of(raws: Sequence[RawCurves], said: SaidOfCurves, stated: tuple[int | None, int | None]) -> Reading:
+    """(travel, load) signs of all files together, which are of one machine."""
+    scores: dict[tuple[int, ...], float] = {(a, b): 0.0 for a in (1, -1) for b in (1, -1)}
+    for raw in raws:
+        for signs, score in press_scores(raw.position, raw.load).items():
+            scores[signs] += score
+    name = re.sub(r"[^a-z]", "", without_unit(raws[0].columns["z"].name).lower())
+    into = _NAMED if name in _INTO else -_NAMED if name in _OUT else -_USUAL if name == "z" else _USUAL
+    for a, b in list(scores):
+        scores[a, b] += into * (a > 0) + _USUAL * (b > 0)
+    kept = {
+        key: score
+        for key, score in scores.items()
+        if all(want is None or want == got for want, got in zip(stated, key, strict=True))
+    }
+    return best(kept)
+
+
+def unclear_signs(raw: RawCurves, signs: Reading) -> RecordingError:
+    z, fz = raw.columns["z"].name, raw.columns["fz"].name
+    return Unclear(
+        f"'{raw.path}': whether '{fz}' is positive or negative in compression cannot be told from how it "
+        f"goes with '{z}' ({signs.words}; if these are the wrong columns, --column depth=NAME and "
+        "--column load=NAME name them)",
+        "compression",
+        ("positive", "negative"),
+    )
+
+
+def say_signs(raw: RawCurves, signs: Reading, notes: list[str]) -> None:
+    travel, load = signs.value
+    z, fz = raw.columns["z"].name, raw.columns["fz"].name
+    way = "into the sample" if travel > 0 else "out of the sample"
+    sign = "positive" if load > 0 else "negative"
+    notes.append(f"'{z}' counts {way}, '{fz}' is {sign} in compression ({signs.words})")
+
+
+def in_units(
+    raw: RawCurves, curves: Sequence[Curve], tip_radius_m: float, notes: list[str], odds: list[float]
+) -> list[Curve]:
+    """The curves in the units that their dent and stiffness tell, where nobody said them. Raises Unclear
+    where two may be meant, ContactError where no tip goes so deep."""
+    depth, push = (float(np.median(v)) for v in zip(*map(_dent, curves), strict=True))
+    z, fz = raw.columns["z"], raw.columns["fz"]
+    length = force = 1.0
+    if z.assumed and depth > 0:
+        sizes = {unit: depth * SI["position"][unit] / (0.5 * tip_radius_m) for unit in _LENGTHS}
+        length = _likely(sizes, _LENGTHS, _LENGTH_FACTOR, "position", raw, notes, odds)
+    depth *= length
+    if depth > _DEEPEST_RADII * tip_radius_m:
+        raise ContactError(
+            f"'{raw.path}': the tip would go {depth:.3g} m deep, {depth / tip_radius_m:.0f} of its radii: "
+            f"are the units and signs of '{z.name}' and '{fz.name}' right? say --units position=mm, --column "
+            "depth=NAME, --column load=NAME, or --tip-radius M"
+        )
+    if fz.assumed and depth > 0 and push > 0:
+        modulus = push / (16 / 9 * np.sqrt(tip_radius_m) * depth**1.5)
+        moduli = {unit: modulus * SI["force"][unit] / _USUAL_E for unit in _FORCES}
+        force = _likely(moduli, _FORCES, _E_FACTOR, "force", raw, notes, odds)
+    if length == force == 1.0:
+        return list(curves)
+    return [Curve(c.t, length * c.travel, force * c.force, c.name) for c in curves]
+
+
+def _likely(
+    sizes: Mapping[str, float], priors: Mapping[str, float], factor: float, kind: str, raw: RawCurves,
+    notes: list[str], odds: list[float],
+) -> float:  # fmt: skip
+    """What one is in SI of the likeliest unit: sizes are over the usual one, which is known to a factor."""
+    units = list(sizes)
+    reading = best(
+        {
+            (k,): float(np.log(priors[unit]) - 0.5 * (np.log(sizes[unit]) / np.log(factor)) ** 2)
+            for k, unit in enumerate(units)
+        }
+    )
+    unit, name = units[reading.value[0]], raw.columns["z" if kind == "position" else "fz"].name
+    if not reading.sure:
+        other = unit if unit != units[0] else units[1]
+        raise Unclear(
+            f"'{raw.path}': the unit of '{name}' is said nowhere, and two are likely ({reading.words})",
+            "units",
+            (f"{kind}={other}", f"{kind}={units[0]}"),
+        )
+    odds.append(reading.odds)
+    if unit != units[0]:
+        notes.append(f"'{name}' names no unit: taken as {unit} ({reading.words})")
+    return SI[kind][unit]
+
+
+_LENGTHS = {"m": 1.0, "mm": 1.0, "um": 0.3}
+_FORCES = {"N": 0.85, "mN": 0.1, "gf": 0.05}
+"""Units that a column may be in that says none."""
+
+
+def _dent(curve: Curve) -> tuple[float, float]:
+    """(depth m, force N) of a press at its peak."""
+    force = curve.force - np.median(curve.force[: max(3, len(curve.force) // 50)])
+    peak = int(np.argmax(force))
+    way = curve.travel[: peak + 1]
+    first = np.flatnonzero(force[: peak + 1] < 0.05 * force[peak])
+    return float(way[-1] - way[first[-1] if len(first) else 0]), float(force[peak])
+
+
+@dataclass(frozen=True)
+class SaidOfCurves:
+    """What was said. columns, units: as of `palpate import`, with the roles depth, height and load too.
+    travel: "into" or "out"; compression: "positive" or "negative" load; clock: "one" or "blocks"."""
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    travel: str | None = None
+    compression: str | None = None
+    clock: str | None = None

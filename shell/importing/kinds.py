@@ -1,0 +1,44 @@
+"""What a file is: a MODEL, a surface, a recording, a machine's curves, or a table of a robot's log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from palpate.importing.machine_tests import is_chiaro, kind_of
+from palpate.importing.mapping import Said, find_columns
+from palpate.importing.tables import TEXT_SUFFIXES, read_tables
+from palpate.mechanics.disk.reading import no_file
+from palpate.mechanics.disk.surface_files import is_surface_file
+from palpate.mechanics.errors import RecordingError
+from palpate.render.press import COLUMNS as PRESS_COLUMNS
+
+_CURVES = ("depth", "height", "load")
+
+
+def kind_of_file(path: Path, columns: Mapping[str, str], units: Mapping[str, str]) -> str:
+    """ "model", "mesh", "recording", "curves" or "table". columns, units: what was said of a table.
+
+    Raises RecordingError for a file that is not there or whose columns cannot be told.
+    """
+    if not path.exists():
+        raise RecordingError(f"'{path}' {no_file(path)}: name a file that is there")
+    if (path / "model.toml").is_file():
+        return "model"
+    if path.is_file() and is_surface_file(path):
+        return "mesh"
+    stem = path.name.removesuffix(".gz").rsplit(".", 1)[0]
+    if path.suffix == ".toml" or (
+        path.name.endswith((".csv", ".csv.gz")) and path.with_name(stem + ".toml").is_file()
+    ):
+        return "recording"
+    if path.suffix.lower() in TEXT_SUFFIXES and (is_chiaro(path) or kind_of(path) != "indentation"):
+        return "curves"
+    if any(role in columns for role in _CURVES):
+        return "curves"
+    tables = read_tables(path)
+    if not columns and tuple(tables[0].columns) == PRESS_COLUMNS:
+        return "curves"
+    found = find_columns(tables, Said(columns=columns, units=units))
+    sideways = [found[role] for role in ("x", "y") if found[role].table is not None]
+    return "table" if sideways else "curves"

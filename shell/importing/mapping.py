@@ -1,0 +1,333 @@
+"""What the columns of other people's tables are: said by name, number or a mapping file, else guessed from
+names.
+
+A mapping file is TOML:
+
+    [columns]   t, x, y, z, fx, fy, fz, qw, qx, qy, qz: a column's name, '#3' its number, 'topic:name' of
+    one of
+                several tables, '-name' its negative, '=0' a constant
+    [units]     time, position, force: where the columns' names do not tell
+    [tool]      tip_radius_m, mass_kg, flange_to_tip_m = [x, y, z] (tool frame)
+    [sensor]    force_on = "tool" | "object", frame = "device" | "tool", rotation = 3 x 3 (sensor to frame)
+    [clock]     offset_s (of the force's clock; "auto" by cross-correlation), rate_hz
+    [tare]      start_s, end_s: the mean force there is taken off
+    [object]    name, poisson_ratio, shape, shape_unit, shape_pose, slab_m, half_space
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from os.path import commonprefix
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.importing.tables import Table
+from palpate.importing.units import SI, plain, unit_in, without_unit
+from palpate.mechanics.disk.reading import read_toml
+from palpate.mechanics.disk.schema import ANY, Key, Schema, check_table
+from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.recording.files import SCHEMA
+
+ROLES = ("t", "x", "y", "z", "fx", "fy", "fz", "qw", "qx", "qy", "qz")
+KIND = {"t": "time", **dict.fromkeys("xyz", "position"), **dict.fromkeys(("fx", "fy", "fz"), "force")}
+_NUMBERS = {
+    "tip_radius_m": Key(low=1e-9, high=0.1, unit="m"),
+    "mass_kg": Key(low=0.0, high=5.0, unit="kg"),
+    "flange_to_tip_m": Key(low=-2.0, high=2.0, size=3, unit="m"),
+    "rate_hz": Key(low=1e-3, high=1e6, unit="Hz"),
+    "tare_s": Key(size=2, unit="s"),
+}
+_SCHEMA: Schema = {
+    "columns": dict.fromkeys(ROLES),
+    "units": dict.fromkeys(SI, Key(str)),
+    "tool": {name: _NUMBERS[name] for name in ("tip_radius_m", "mass_kg", "flange_to_tip_m")},
+    "sensor": {
+        "force_on": Key(str, choices=("tool", "object")),
+        "frame": Key(str, choices=("device", "tool")),
+        "rotation": ANY,
+    },
+    "clock": {"offset_s": ANY, "rate_hz": _NUMBERS["rate_hz"]},
+    "tare": {"start_s": Key(unit="s"), "end_s": Key(unit="s", required=True)},
+    "object": {
+        key: form
+        for key, form in SCHEMA["object"].items()  # type: ignore[union-attr]
+        if key != "model"
+    },
+}
+"""What a mapping file may hold."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """Everything that a mapping says; None or empty where it says nothing."""
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    tip_radius_m: float | None = None
+    mass_kg: float = 0.0
+    flange_to_tip_m: Sequence[float] | None = None
+    force_on: str | None = None
+    frame: str = "device"
+    rotation: Any = None
+    offset_s: float | str | None = None
+    rate_hz: float | None = None
+    clock: str | None = None
+    tare_s: tuple[float, float] | None = None
+    thing: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Raises RecordingError for a role, unit, frame or body that does not exist."""
+        for name, value, allowed in (
+            ("force_on", self.force_on, (None, "tool", "object")),
+            ("clock", self.clock, (None, "one", "blocks")),
+            ("frame", self.frame, ("device", "tool")),
+        ):
+            if value not in allowed:
+                raise RecordingError(
+                    f"{name} is {value!r}; allowed are {' and '.join(filter(None, allowed))}"
+                )
+        for role in self.columns:
+            if role not in ROLES:
+                raise RecordingError(f"'{role}' is no column of a recording; allowed are {', '.join(ROLES)}")
+        for kind, unit in self.units.items():
+            if kind not in SI:
+                raise RecordingError(f"units of '{kind}' are not asked for; allowed are {', '.join(SI)}")
+            if plain(unit) not in SI[kind]:
+                raise RecordingError(f"'{unit}' is no unit of {kind}; allowed are {', '.join(SI[kind])}")
+        for name, key in _NUMBERS.items():
+            given = getattr(self, name)
+            if given is not None and not key.takes(np.asarray(given).tolist()):
+                raise RecordingError(f"{name} is {given}; it must be {key.words}")
+
+
+def read_mapping(path: Path | str) -> dict[str, Any]:
+    """The fields of a mapping file; raises RecordingError for one that is no TOML or has another key."""
+    path = Path(path)
+    held = read_toml(path, RecordingError)
+    check_table(held, _SCHEMA, path, RecordingError, strict=True)
+    found: dict[str, Any] = {}
+    for table in ("columns", "units"):
+        if table in held:
+            found[table] = {k: str(v) for k, v in held[table].items()}
+    for table in ("tool", "sensor", "clock"):
+        found |= held.get(table, {})
+    if "tare" in held:
+        found["tare_s"] = (float(held["tare"].get("start_s", 0.0)), float(held["tare"]["end_s"]))
+    if "object" in held:
+        found["thing"] = held["object"]
+    return found
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column found: its table, its name there, factor to SI (with its sign), and the unit it was taken
+    in; assumed: nobody said the unit; unit_said: a person did, beside the names."""
+
+    role: str
+    table: Table | None
+    name: str
+    factor: float
+    unit: str
+    guessed: bool
+    assumed: bool = False
+    unit_said: bool = False
+
+    @property
+    def values(self) -> np.ndarray | float:
+        """(n,) in SI, or a constant."""
+        if self.table is None:
+            return self.factor
+        return self.factor * self.table.columns[self.name]
+
+    def __str__(self) -> str:
+        if self.table is None:
+            return f"{self.role} = {self.factor:g}"
+        sign = "-" if self.factor < 0 else ""
+        own = unit_in(self.name, KIND[self.role]) if self.role in KIND else None
+        unit = "" if own == self.unit else f" [{self.unit}]"
+        how = "guessed" if self.guessed else "said"
+        if self.guessed and self.unit_said:
+            how = "guessed, unit said"
+        return f"{self.role} = {sign}{self.name}{unit} ({how})"
+
+
+_AXIS = {"x": ("x", "0"), "y": ("y", "1"), "z": ("z", "2")}
+_BEFORE = {
+    "position": "pos position p tcp tip tippos tipposition tcppose tcpposition toolposition actualtcppose"
+    " pose poseposition poseposeposition translation transformtranslation ee eepos probe probepos"
+    " loc location flange flangeposition flangepos weg",
+    "force": "f force forces wrenchforce ft tcpforce actualtcpforce wrench load sensorforce forcetorque"
+    " kraft",
+    "quaternion": "q quat quaternion orientation poseorientation poseposeorientation rotation"
+    " transformrotation rot flangeorientation",
+}
+_TIME = (
+    "t time times timestamp timestamps stamp ts sec secs seconds elapsed elapsedtime clock datetime date zeit"
+)
+_ORDERED = re.compile(r"(.*?)_?(xyzw|wxyz)\W*(\d)\W*$", re.IGNORECASE)
+"""An array of quaternions whose name tells the order of its columns."""
+_ALONG = (
+    "depth displacement travel indentation indent extension compression crosshead stroke position z piezo"
+    " height gap weg"
+)
+_PUSH = "force load fn normalforce f reaction reactionforce fz push kraft"
+
+
+def _key(name: str) -> str:
+    ordered = _ORDERED.match(name)
+    if ordered and int(ordered[3]) < 4:
+        name = ordered[1] + "_q" + ordered[2][int(ordered[3])]
+    return re.sub(r"[^a-z0-9]", "", without_unit(name).lower())
+
+
+def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
+    """Each role's column: what was said, else what the names tell.
+
+    Raises RecordingError where position or force cannot be told, naming the columns that there are.
+    """
+    found = {role: _said(tables, role, text, said) for role, text in said.columns.items()}
+    for role in ROLES:
+        if role not in found:
+            guess = _guess(tables, role)
+            if guess is not None:
+                found[role] = _column(role, *guess, said, guessed=True)
+    _complete(tables, said, found)
+    for kind, roles in (("position", "xyz"), ("force", ("fx", "fy", "fz"))):
+        missing = [role for role in roles if role not in found]
+        if missing:
+            raise RecordingError(
+                f"which columns are {kind} ({', '.join(missing)}) cannot be told from their names; say it "
+                f"with --column {missing[0]}=NAME (or '#3', '=0'): there are {_listed(tables)}"
+            )
+    if any(q in found for q in ROLES[7:]) and not all(q in found for q in ROLES[7:]):
+        found = {role: column for role, column in found.items() if not role.startswith("q")}
+    return found
+
+
+def time_of(table: Table, said: Said) -> Column | None:
+    """A table's own column of time, by its name."""
+    guess = _guess([table], "t")
+    return None if guess is None else _column("t", *guess, said, guessed=True)
+
+
+def _listed(tables: Sequence[Table]) -> str:
+    each = [n for t in tables for n in t.columns]
+    names = [f"{t.name}:{n}" if each.count(n) > 1 else n for t in tables for n in t.columns]
+    return ", ".join(names[:40]) + (f" and {len(names) - 40} more" if len(names) > 40 else "")
+
+
+def _said(tables: Sequence[Table], role: str, text: str, said: Said) -> Column:
+    text = text.strip()
+    if text.startswith("="):
+        try:
+            return Column(role, None, "", float(text[1:]), "", False)
+        except ValueError as error:
+            raise RecordingError(f"{role}: '{text}' is no constant; write =0 or =0.01, in SI") from error
+    sign = -1.0 if text.startswith("-") and not any(text in t.columns for t in tables) else 1.0
+    name = text[1:] if sign < 0 else text
+    matches = []
+    for table in tables:
+        own = name.removeprefix(f"{table.name}:")
+        if own in table.columns:
+            matches.append((table, own))
+        elif re.fullmatch(r"#\d+", own) and 0 < int(own[1:]) <= len(table.columns):
+            matches.append((table, list(table.columns)[int(own[1:]) - 1]))
+        else:
+            alike = [n for n in table.columns if without_unit(n).strip().lower() == own.lower()]
+            matches += [(table, alike[0])] if len(alike) == 1 else []
+    if len(matches) != 1:
+        why = "is in several tables: write TABLE:NAME" if matches else "is not there"
+        raise RecordingError(f"{role}: column '{name}' {why}; there are {_listed(tables)}")
+    return _column(role, *matches[0], said, sign=sign)
+
+
+def _column(
+    role: str, table: Table, name: str, said: Said, *, sign: float = 1.0, guessed: bool = False
+) -> Column:
+    kind = KIND.get(role)
+    if kind is None:
+        return Column(role, table, name, sign, "1", guessed)
+    unit = plain(said.units[kind]) if kind in said.units else unit_in(name, kind)
+    assumed = unit is None
+    unit = unit or next(iter(SI[kind]))
+    return Column(role, table, name, sign * SI[kind][unit], unit, guessed, assumed, kind in said.units)
+
+
+def _guess(tables: Sequence[Table], role: str) -> tuple[Table, str] | None:
+    """The one column whose name says the role; None where none or several do."""
+    if role == "t":
+        wanted = set(_TIME.split())
+    elif role.startswith("q"):
+        before = _BEFORE["quaternion"].split()
+        wanted = {b + end for b in before for end in (role, role[1])} | {role}
+    else:
+        kind = KIND[role]
+        wanted = {b + end for b in _BEFORE[kind].split() for end in _AXIS[role[-1]]}
+        wanted |= {role} | {end + b for b in ("pos", "position") for end in role if kind == "position"}
+    matches = []
+    for table in tables:
+        inside = _shared_prefix(table)
+        own_name = {name: _key(name[inside:]) for name in table.columns}
+        named = [name for name, own in own_name.items() if own in wanted or _ends(name, role, wanted)]
+        # X (N) is a force, whatever X is else
+        named += [name for name, own in own_name.items() if role[0] == "f" and own == role[1]]
+        own = [name for name in dict.fromkeys(named) if _may_be(name, role, own_name[name])]
+        matches += [(table, name) for name in own[:1] if len(own) == 1 or role == "t"]
+    if role == "t":
+        return matches[0] if len(matches) >= 1 else None
+    return matches[0] if len(matches) == 1 else None
+
+
+def _shared_prefix(table: Table) -> int:
+    """Length of the structure's name that all columns begin with: data.x, data.y."""
+    return commonprefix(list(table.columns)).rfind(".") + 1 if len(table.columns) > 1 else 0
+
+
+def _may_be(name: str, role: str, own: str) -> bool:
+    """Whether the unit in a column's name is of the role's kind, or tells no kind."""
+    kinds = [kind for kind in SI if unit_in(name, kind) is not None]
+    if role[0] == "f" and own == role[1]:
+        return "force" in kinds
+    return not kinds or KIND.get(role) in kinds
+
+
+def _ends(name: str, role: str, wanted: set[str]) -> bool:
+    """Whether the end of a dotted name says the role: msg.wrench.force.x."""
+    parts = re.split(r"[./]", name)
+    last = _key(parts[-1])
+    # an axis alone is anything's
+    return len(parts) > 1 and (
+        (len(last) > 1 and last in wanted) or any(_key("".join(parts[-k:])) in wanted for k in (2, 3))
+    )
+
+
+def _complete(tables: Sequence[Table], said: Said, found: dict[str, Column]) -> None:
+    """A machine with one axis: its travel is downward z, its push fz; what is missing is 0."""
+    sideways = any(_key(name) in ("x", "y") for table in tables for name in table.columns)
+    if not sideways and not any(role in found for role in "xyz"):
+        along = _first(tables, _ALONG)
+        if along is not None:
+            # travel counts into the sample, z out of it
+            sign = 1.0 if _key(along[1]) in ("z", "height", "gap") else -1.0
+            found["z"] = _column("z", *along, said, sign=sign, guessed=True)
+    if not any(role in found for role in ("fx", "fy", "fz")):
+        push = _first(tables, _PUSH)
+        if push is not None:
+            found["fz"] = _column("fz", *push, said, guessed=True)
+    for axes in (("x", "y", "z"), ("fx", "fy", "fz")):
+        there = [axis for axis in axes if axis in found]
+        if len(there) == 1 and there[0][-1] == "z":
+            found.update({axis: Column(axis, None, "", 0.0, "", True) for axis in axes[:2]})
+
+
+def _first(tables: Sequence[Table], words: str) -> tuple[Table, str] | None:
+    for word in words.split():
+        for table in tables:
+            names = [name for name in table.columns if _key(name) == word]
+            if names:
+                return table, names[0]
+    return None

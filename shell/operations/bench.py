@@ -1,0 +1,115 @@
+"""Benchmarks: medians, spreads, and ratios against a peer or limit in the same run.
+
+They lie in the folder `benchmarks` of a clone of the project and are found from inside of that clone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import pkgutil
+import sys
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import Any
+
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.names import unknown
+from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._to_argparse import OneLineParser
+from palpate.output import Output, emit_json
+
+_HELPERS = ("evidence", "timing")
+
+
+@dataclass(frozen=True)
+class BenchOperands:
+    """Which, and what it takes."""
+
+    name: str = operand(
+        REQUIRED, "which; without a known name the error lists them", metavar="name", positional=True
+    )
+    _: KW_ONLY
+    rest: list[str] = operand(
+        (), "the benchmark's own options (NAME --help)", metavar="...", positional=True, count="..."
+    )
+
+
+def clone() -> Path:
+    """The clone of the project that the working folder lies in. Raises OptionError outside of one."""
+    here = Path.cwd()
+    for folder in (here, *here.parents):
+        if (folder / "benchmarks" / "__init__.py").is_file() and (folder / "shell" / "cli.py").is_file():
+            return folder
+    raise OptionError(
+        f"benchmarks come with a clone of the project, not with what is installed: '{here}' lies in none; "
+        "change into the clone and run it there"
+    )
+
+
+def names() -> list[str]:
+    """The benchmarks of the clone that one stands in, as the command line spells them."""
+    found = (m.name for m in pkgutil.iter_modules([str(clone() / "benchmarks")]) if not m.ispkg)
+    return sorted(n.replace("_", "-") for n in found if n not in _HELPERS and not n.startswith("_"))
+
+
+def _answer(run: Any, asked: BenchOperands, out: Output) -> int:
+    own, figures = run(out.destination)
+    emit_json(figures, own.json)
+    if own.evidence:
+        _keep(own.evidence, asked, figures.get("figures", ()))
+    return 0
+
+
+def _keep(path: str, asked: BenchOperands, figures: Any) -> None:
+    """Write the figures with command, commit, date and processor."""
+    evidence = importlib.import_module("benchmarks.evidence")  # it lies in the clone, not in the product
+    if not figures:
+        raise OptionError(f"--evidence: 'palpate bench {asked.name}' gives no figures to keep")
+    words = ["palpate", "bench", asked.name, *_deciding(list(asked.rest))]
+    kept = evidence.write(path, evidence.measured(" ".join(words), figures, clone()))
+    print(f"kept: {kept}", file=sys.stderr)
+
+
+_PLACES = ("--evidence", "--json", "--work", "--data", "--python", "--page")
+
+
+def _deciding(words: list[str]) -> list[str]:
+    """The options that decide what was measured, without those that say where on a machine things lie."""
+    kept: list[str] = []
+    left_out = False
+    for word in words:
+        if word.startswith("-") and word != "-":
+            left_out = word in _PLACES
+            if left_out or word.startswith(tuple(f"{name}=" for name in _PLACES)):
+                continue
+        elif left_out:
+            left_out = False
+            continue
+        kept.append(word)
+    return kept
+
+
+@operation(BenchOperands, answer=_answer, progress=False)
+def bench(asked: BenchOperands, call: Call) -> Any:
+    """Find one benchmark; what is returned runs it. Raises OptionError for one that is not there."""
+    if asked.name not in names():
+        raise OptionError(unknown(asked.name, "benchmark", names()))
+    sys.path.insert(0, str(clone()))
+    module = importlib.import_module(f"benchmarks.{asked.name.replace('-', '_')}")
+
+    def run(destination: str | None) -> tuple[argparse.Namespace, Any]:
+        parser = OneLineParser(prog=f"palpate bench {asked.name}", description=module.__doc__)
+        module.add_arguments(parser)
+        parser.add_argument("--json", metavar="PATH", default=destination, help="write the figures as JSON")
+        parser.add_argument(
+            "--evidence",
+            metavar="PATH",
+            nargs="?",
+            const=str(clone() / "docs" / "evidence" / f"{asked.name}.json"),
+            help="keep figures, command, commit, date and processor (default: docs/evidence/NAME.json)",
+        )
+        own = parser.parse_args(asked.rest)
+        return own, module.run(own)
+
+    return run

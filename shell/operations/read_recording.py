@@ -1,0 +1,112 @@
+"""Recordings, by file, by embedded name, or from what already holds one."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._shared import tip_radius_operand
+
+if TYPE_CHECKING:
+    from palpate.mechanics.recording.recording import Recording
+    from palpate.operations._shared import RecordingLike
+
+
+@dataclass(frozen=True)
+class ReadOperands:
+    """What is read."""
+
+    source: RecordingLike = operand(REQUIRED, "NAME.csv, NAME.csv.gz, NAME.toml, or an embedded name")
+
+
+@operation(ReadOperands, progress=False)
+def read_recording(asked: ReadOperands, call: Call) -> Recording:
+    """Read a recording: NAME.csv, NAME.csv.gz or NAME.toml, or an embedded one by its name.
+
+    Times s, positions of the tip's centre m, forces on the tool N, device frame.
+    Raises RecordingError for what is missing or impossible.
+    """
+    from palpate.mechanics.recording.recording import Recording as Plain
+    from palpate.mechanics.recording.recording import read_recording as read
+    from palpate.mechanics.recording.sane import check_sane
+    from palpate.scenes.embedded import embedded_names, embedded_recording
+
+    source = asked.source
+    held = source if isinstance(source, Plain) else getattr(source, "recording", None)
+    if isinstance(held, Plain):
+        try:
+            check_sane(
+                held.t, held.sample_rate_hz, held.position, held.force_on_tool
+            )  # arrays get what files get
+        except RecordingError as error:
+            words = "pp.recording(t, position, force, tip_radius=..., units=...) takes arrays in other units"
+            raise RecordingError(f"{error}; {words}") from error
+        return held
+    if str(source) in embedded_names():
+        return read(embedded_recording(str(source)))
+    if not isinstance(source, str | Path):
+        raise OptionError(f"a {type(source).__name__} is no recording: give one, or the path of its file")
+    try:
+        return read(source)
+    except RecordingError as error:
+        if Path(source).exists() and not _described(Path(source)):
+            raise RecordingError(
+                f"{error}; another program's file is brought in by 'palpate import {source} -o REC', or by "
+                f"'palpate open {source}'"
+            ) from error
+        if Path(source).exists() or "." in Path(source).name:
+            raise
+        raise RecordingError(f"{error}; embedded are {', '.join(embedded_names())}") from error
+
+
+def _described(path: Path) -> bool:
+    """Whether a description lies beside a recording's samples."""
+    stem = path.name.removesuffix(".gz").rsplit(".", 1)[0]
+    return path.with_name(stem + ".toml").exists()
+
+
+@dataclass(frozen=True)
+class ArrayOperands:
+    """Samples, and what they are of."""
+
+    t: Any = operand(REQUIRED, "times, (n,)", unit="s")
+    position: Any = operand(REQUIRED, "of the tip's centre, (n, 3)", unit="m")
+    force: Any = operand(REQUIRED, "(n, 3)", unit="N")
+    _: KW_ONLY
+    tip_radius_m: float | None = tip_radius_operand("of the tool's spherical tip; also said as tip_radius")
+    tip_radius: float | None = operand(None, "the same", unit="m")
+    force_on: str | None = operand(
+        None, "whose force it is; None: by what a solid does", choices=("tool", "object")
+    )
+    units: Any = operand(None, "of the arrays, where they are in others: {'position': 'mm'}")
+    thing: Any = operand(None, "what [object] of a recording says: {'slab_m': 0.03}")
+
+
+@operation(ArrayOperands, progress=False)
+def recording(asked: ArrayOperands, call: Call) -> Recording:
+    """Arrays as a recording, with the checks that files get: units (s, m, N), sizes, whose force it is.
+
+    Raises RecordingError where shapes disagree, a unit is doubtful or something needed is missing.
+    """
+    import numpy as np
+
+    from palpate.importing.convert import understand
+    from palpate.importing.mapping import Said
+    from palpate.importing.tables import Table
+
+    t, position, force = (np.asarray(v, dtype=float) for v in (asked.t, asked.position, asked.force))
+    if t.ndim != 1 or position.shape != (len(t), 3) or force.shape != (len(t), 3):
+        raise RecordingError(
+            f"t is {t.shape}, position {position.shape}, force {force.shape}; allowed are (n,), (n, 3) "
+            "and (n, 3)"
+        )
+    names = ("t", "x", "y", "z", "fx", "fy", "fz")
+    columns = dict(zip(names, np.column_stack([t, position, force]).T, strict=True))
+    said = Said(
+        tip_radius_m=asked.tip_radius_m if asked.tip_radius is None else asked.tip_radius,
+        force_on=asked.force_on, units=asked.units or {}, thing=asked.thing or {},
+    )  # fmt: skip
+    return understand([Table("arrays", columns)], said, "arrays").recording

@@ -1,0 +1,79 @@
+"""Renderers: what answers a tip at 1 kHz; `replay` and `press` make theirs here too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.mechanics.errors import OptionError
+from palpate.mechanics.names import unknown
+from palpate.mechanics.progress import Progress
+from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._shared import with_friction
+from palpate.operations.load import load
+from palpate.render.options import RenderOptions
+from palpate.render.registry import create, names, simulator_names
+from palpate.render.support import SupportOptions
+
+if TYPE_CHECKING:
+    from palpate.operations._shared import ModelLike
+    from palpate.render.base import Renderer
+    from palpate.render.scene import TouchScene
+
+
+@dataclass(frozen=True)
+class RendererOperands:
+    """Whose, and which."""
+
+    model: ModelLike | Renderer = operand(REQUIRED, "of which object")
+    name: str = operand("fem", f"one of {', '.join(names())}")
+    _: KW_ONLY
+
+
+@operation(RendererOperands, RenderOptions)
+def renderer(asked: RendererOperands, call: Call) -> Renderer:
+    """The renderer of a model: `state = r.start()`, then `state, forces = r.step(state, tips)` at 1 kHz.
+
+    tips (m, 3) m are the tips' centres, forces (m, 3) N act on the tool; device frame. The model's compliance
+    is computed, some seconds, or read from its folder. Raises OptionError.
+    """
+    make = touched_scene(asked.model, asked.name, call)
+    with call.progress("renderer") as tell:
+        return make(tell).renderer
+
+
+def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], TouchScene]:
+    """What will make the renderer, on its model's support; options are looked at at once."""
+    from palpate.render.base import Renderer
+    from palpate.render.scene import scene_of
+    from palpate.render.surface.felt_surface import with_own_stiffness
+
+    support = call.of(SupportOptions)
+    if isinstance(model, Renderer):
+        given = call.values(RenderOptions)
+        if given:
+            words = "a renderer that is there keeps its options; give them to pp.renderer"
+            raise OptionError(f"{', '.join(given)}: {words}")
+        return lambda tell: scene_of(model, support)
+    allowed = (*names(), *simulator_names())
+    if name not in allowed:
+        raise OptionError(unknown(name, "renderer", allowed))
+    chosen = _with_scene(model, call.of(RenderOptions))
+
+    def make(tell: Progress) -> TouchScene:
+        made = create(name, load(model, progress=tell), chosen, tell)
+        if made.model.path is not None:
+            with_own_stiffness(made)
+        return scene_of(made, support)
+
+    return make
+
+
+def _with_scene(model: Any, options: RenderOptions) -> RenderOptions:
+    """The options with what the scene's file says, where a scene was given."""
+    from palpate.scenes.scene import Scene, load_scene
+
+    scene = load_scene(model) if isinstance(model, str | Path) else model
+    return with_friction(options, scene) if isinstance(scene, Scene) else options

@@ -1,0 +1,329 @@
+"""Feel a model or scene at 1 kHz: in a window, or headless.
+
+MODEL_OR_SCENE is a MODEL folder, a scene (demo, silicone-1, silicone-2, silicone-3, bean, nodule,
+your-recording, or a scene's .toml), a recording, a phantom, or the file of a surface (STL, OBJ, PLY, glTF,
+VTP, VTU, MSH, INP) with --unit and --modulus. In the window the mouse hovers over the object, the left button
+presses, the wheel sets the depth, the right button turns the view; buttons do the rest.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from dataclasses import KW_ONLY, dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.devices.channel import PoseChannel
+from palpate.devices.mapper import MapperOptions, Mapping
+from palpate.devices.registry import DEVICES, DeviceChoice, options_of, spec_of
+from palpate.mechanics.disk.writing import PNG
+from palpate.mechanics.errors import DeviceError, OptionError
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.names import unknown
+from palpate.mechanics.progress import Progress
+from palpate.operations._declare import Call, operand, operation
+from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
+from palpate.output import Output, progress_bar
+from palpate.render.options import RenderOptions
+from palpate.render.registry import names
+from palpate.render.support import SupportOptions
+from palpate.scenes.build import model_of
+from palpate.scenes.exploration import ExplorationOptions, explore
+from palpate.scenes.scene import Scene, load_scene, scene_names
+from palpate.servo import SafetyOptions, ServoOptions, ServoReport
+from palpate.servo.started import StartedServo
+from palpate.warm_up import OF_A_TOUCH, OF_ITS_SERVO, warming_up
+from palpate.window.session import SessionOptions, TouchSession
+
+if TYPE_CHECKING:
+    from palpate.window.guide import Guide
+
+POLL_S = 0.1
+DEFAULT = "demo"
+_NOT_RECORDED = "keep the touch, for reconstruct, compare and diagnose: --record REC.csv.gz"
+
+
+@dataclass(frozen=True)
+class TouchOperands:
+    """The scene, the device, the window."""
+
+    scene: str | None = operand(
+        None,
+        "what to touch; None: chosen in the window, without one demo",
+        metavar="MODEL_OR_SCENE",
+        positional=True,
+        count="?",
+        reads=True,
+    )
+    _: KW_ONLY
+    device: str | None = operand(
+        None, f"one of {', '.join(DEVICES)}; None: mouse; headless: simulated", metavar="NAME"
+    )
+    headless: bool = operand(False, "no window: all else is the same")
+    seconds: float | None = operand(None, "stop after this time; None: when the window closes", unit="s")
+    record: str | Path | None = operand(
+        None, "write the session as a recording (NAME.csv.gz)", metavar="REC", writes=SAMPLES
+    )
+    replay: str | None = operand(
+        None, "the recording that the device 'replay' plays", metavar="REC", reads=True
+    )
+    renderer: str | None = operand(None, f"one of {', '.join(names())}; None: the scene's", metavar="NAME")
+    beside: str | None = operand(
+        None,
+        "a second renderer, driven by the same tip, or 'none'; None: the scene's",
+        metavar="NAME",
+        rare=True,
+    )
+    screenshot: str | Path | None = operand(None, "save the window at its end", metavar="PNG", writes=PNG)
+    seed: int = seed_operand()
+    guide: Callable[[TouchSession], Guide] | None = operand(
+        None, "makes the guide of an exploration, for the window", only="python"
+    )
+
+
+@dataclass(frozen=True)
+class Touched:
+    """What the servo did. failure: what stopped it, '' where nothing did."""
+
+    scene: Scene
+    device: str
+    renderer: str
+    report: ServoReport
+    record: str | Path | None
+    failure: str
+
+    def lines(self) -> list[str]:
+        """For a person."""
+        recorded = [] if self.record is None else [f"recorded {self.record}"]
+        report = self.report.text(sent=spec_of(self.device).has_force)
+        return [f"{self.scene.title}: {self.renderer}, {self.device}", report, *recorded]
+
+
+def _answer(touched: Touched | None, asked: TouchOperands, out: Output) -> int:
+    if touched is not None:
+        follows = f"see what it holds: palpate check {touched.record}" if touched.record else _NOT_RECORDED
+        out.say(*touched.lines(), f"next: {follows}")
+        out.json({"scene": touched.scene.name, "device": touched.device, "servo": touched.report.as_dict()})
+        if touched.failure:
+            raise DeviceError(touched.failure)
+    return 0
+
+
+@operation(
+    TouchOperands,
+    MeshFileOptions,
+    MapperOptions,
+    RenderOptions,
+    ServoOptions,
+    SupportOptions,
+    SafetyOptions,
+    *map(options_of, DEVICES),
+    ExplorationOptions,
+    often="young_modulus_pa unit friction max_force_n",
+    answer=_answer,
+    progress=False,
+)
+def touch(asked: TouchOperands, call: Call) -> Touched | None:
+    """Open, touch, close; None where the window was closed before the touch began."""
+    name = asked.device or ("simulated" if asked.headless else "mouse")
+    _check(asked, name)
+    servo_options = call.of(
+        ServoOptions, safety=call.of(SafetyOptions), support_plane=call.of(SupportOptions)
+    )
+    for word in servo_options.loosened:
+        print(f"palpate touch: {word}", file=sys.stderr)
+    with warming_up(OF_A_TOUCH) as compiling:  # while a person chooses, too
+        opening = _Opening(asked, call, name, servo_options, compiling)
+        return _in_window(opening) if not asked.headless else _without(opening)
+
+
+def _without(opening: _Opening) -> Touched:
+    """Touch without a window."""
+    asked = opening.asked
+    scene = opening.scene(asked.scene or DEFAULT)
+    with ExitStack() as stack:
+        servo = stack.enter_context(StartedServo(OF_ITS_SERVO))
+        with progress_bar("touch") as bar:
+            session, until = opening.session(stack, servo, scene, None, bar)
+        session.enable()
+        _wait(session, until if asked.seconds is None else asked.seconds)
+        return opening.touched(session, scene)
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """What was asked for, of whichever scene. compiling: waits for the loop's kernels."""
+
+    asked: TouchOperands
+    call: Call
+    device: str
+    servo: ServoOptions
+    compiling: Callable[[], object]
+
+    def scene(self, name: str) -> Scene:
+        return given_scene(name, self.call)
+
+    def session(
+        self, stack: ExitStack, servo: StartedServo, scene: Scene, channel: PoseChannel | None, tell: Progress
+    ) -> tuple[TouchSession, float | None]:
+        """A started session, which the stack closes, and when its device will have done (s)."""
+        asked, call = self.asked, self.call
+        model = model_of(scene, lambda stage, share: tell(stage, 0.4 * share))
+        if channel is not None:
+            channel.write(time.perf_counter(), tuple(_above(model)))
+        device, until = device_choice(asked, call, self.device, model, channel)
+        options = SessionOptions(
+            renderer=asked.renderer or scene.renderer,
+            beside=_beside(asked, scene),
+            render=with_friction(call.of(RenderOptions), scene),
+            servo=self.servo,
+            recording=None if asked.record is None else Path(asked.record),
+            pictures=not asked.headless,
+        )
+        mapping = _mapping(call, self.device, scene, model)
+
+        def compiled() -> None:
+            if options.renderer == "fem":
+                tell("compiling, once after an installation", 0.5)
+                self.compiling()
+
+        session = TouchSession(
+            model, title=scene.title, device=device, mapping=mapping, options=options, started=servo
+        )
+        opened = stack.enter_context(session)
+        opened.start(lambda stage, share: tell(stage, 0.5 + 0.5 * share), compiled=compiled)
+        return session, until
+
+    def touched(self, session: TouchSession, scene: Scene) -> Touched:
+        """What was done."""
+        report, failure = session.report(), session.servo.failure
+        return Touched(scene, self.device, session.renderer_name, report, self.asked.record, failure)
+
+
+def _in_window(opening: _Opening) -> Touched | None:
+    """A window from the first moment on, where a scene is chosen and which shows how the preparation comes
+    along; then the touch, of one scene after the other. None where a person closes it before."""
+    asked = opening.asked
+    # who says how long is not there to choose
+    name = asked.scene or (None if asked.seconds is None and asked.guide is None else DEFAULT)
+    chosen = None if name is None else opening.scene(name)
+    while True:
+        with ExitStack() as stack:
+            servo = stack.enter_context(StartedServo(OF_ITS_SERVO))
+            # what draws is loaded while the servo loads
+            from palpate.window.waiting import ClosedError, WaitingWindow
+            from palpate.window.window import TouchWindow
+
+            waiting = stack.enter_context(closing(WaitingWindow(_gallery() if chosen is None else ())))
+            mouse = opening.device == "mouse"
+            channel = stack.enter_context(closing(PoseChannel.create())) if mouse else None
+            try:
+                scene = chosen or opening.scene(waiting.choose().name)
+                prepare = partial(opening.session, stack, servo, scene, channel)
+                session, until = waiting.run(scene.title, prepare)
+            except ClosedError as error:
+                print(f"palpate touch: {error}", file=sys.stderr)
+                return None
+            session.enable()
+            guide = None if asked.guide is None else asked.guide(session)
+            window = TouchWindow(session, scene, channel, guide=guide)
+            seconds = until if asked.seconds is None else asked.seconds
+            picture = None if asked.screenshot is None else Path(asked.screenshot)
+            window.run(seconds, screenshot=picture, shown=waiting.close)
+            if not window.another:
+                return opening.touched(session, scene)
+        chosen = None
+
+
+def _gallery() -> list[Scene]:
+    """What there is to choose from, the demo's object first; one is there to be copied, not touched."""
+    there = [name for name in scene_names() if name not in (DEFAULT, "your-recording")]
+    return [load_scene(name) for name in (DEFAULT, *there)]
+
+
+def _check(asked: TouchOperands, name: str) -> None:
+    for value, allowed, what in (
+        (name, tuple(DEVICES), "device"),
+        (asked.renderer, names(), "renderer"),
+        (asked.beside, (*names(), "none"), "renderer"),
+    ):
+        if value is not None and value not in allowed:
+            raise OptionError(unknown(value, what, allowed))
+    if asked.seconds is not None and not asked.seconds > 0:
+        raise OptionError(f"--seconds is {asked.seconds}; it must be greater than 0")
+    if name == "replay" and not asked.replay:
+        raise OptionError("the device 'replay' plays a recording: name it with --replay REC")
+    if asked.headless:
+        if name == "mouse":
+            raise DeviceError("the mouse needs the window: drop --headless, or use --device simulated")
+    elif sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise DeviceError(
+            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): use --headless, a desktop, or "
+            "'xvfb-run -s \"-screen 0 1280x800x24\" palpate touch ...'"
+        )
+
+
+def device_choice(
+    asked: TouchOperands, call: Call, name: str, model: Model | None, channel: PoseChannel | None
+) -> tuple[DeviceChoice, float | None]:
+    """The device for the servo process to make, and when it will have done (s), None for never."""
+    options: Any = call.of(options_of(name))
+    if channel is not None:
+        return DeviceChoice(name, {"channel": str(channel.path), "options": options}), None
+    if name == "replay":
+        recording = str(Path(str(asked.replay)).resolve())
+        return DeviceChoice(name, {"recording": recording, "options": options}), None
+    if name == "simulated":
+        assert model is not None
+        path, _ = explore(
+            model,
+            call.of(ExplorationOptions),
+            hand_stiffness_n_per_m=options.stiffness_n_per_m,
+            seed=asked.seed,
+        )
+        keywords = {"options": options, "intention": path, "seed": asked.seed}
+        return DeviceChoice(name, keywords), path.duration_s + 2.0
+    return DeviceChoice(name, {"options": options}), None
+
+
+def _beside(asked: TouchOperands, scene: Scene) -> str:
+    if asked.beside is not None:
+        return "" if asked.beside == "none" else asked.beside
+    return "" if asked.headless else scene.beside
+
+
+def _mapping(call: Call, name: str, scene: Scene, model: Model) -> Mapping | None:
+    """None, the identity, for devices that live in the scene's frame already."""
+    if name in ("mouse", "simulated", "replay"):
+        return None
+    options = MapperOptions(**{**vars(scene.mapper), **call.values(MapperOptions)})
+    return Mapping.from_options(options, centre_m=_above(model), rate=spec_of(name).control == "rate")
+
+
+def _above(model: Model) -> np.ndarray:
+    """(3,) m, two finger's widths over the middle of the object: where a device's middle lies."""
+    top = model.support.height(model.mesh.points).max()
+    return model.mesh.points[model.mesh.fixed].mean(axis=0) + (top + 0.03) * model.support.normal
+
+
+def _wait(session: TouchSession, seconds: float | None) -> None:
+    """Collect frames until the time is up; without a time, until Ctrl-C."""
+    start = time.perf_counter()
+    with progress_bar("touching") as bar:
+        while session.servo.alive:
+            elapsed = time.perf_counter() - start
+            if seconds is not None:
+                if elapsed >= seconds:
+                    return
+                bar(f"{elapsed:.0f} of {seconds:.0f} s", elapsed / seconds)
+            session.frame()
+            time.sleep(POLL_S)

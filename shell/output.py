@@ -1,0 +1,130 @@
+"""What a command says: progress on standard error, JSON to a file or standard output, lines for a person."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import shutil
+import sys
+import threading
+from pathlib import Path
+from typing import Any, Self
+
+from palpate.mechanics.disk.writing import JSON, atomic_file
+from palpate.mechanics.progress import Remaining
+
+
+class Output:
+    """Standard output of one command. destination: of its JSON; '-' keeps standard output for it alone."""
+
+    def __init__(self, destination: str | None = None) -> None:
+        self.destination = destination
+
+    def say(self, *lines: str) -> None:
+        """Print lines for a person, unless standard output belongs to JSON."""
+        if self.destination != "-" and lines:
+            print(*lines, sep="\n")
+
+    def json(self, value: Any) -> None:
+        """Write the answer as JSON where that was asked for."""
+        emit_json(value, self.destination)
+
+
+def emit_json(value: Any, destination: str | None) -> None:
+    """Write `value` as JSON to a file, or to standard output for '-'; nothing for None."""
+    if destination is None:
+        return
+    text = json.dumps(plain(value), indent=1)
+    if destination == "-":
+        print(text)
+        return
+    with atomic_file(destination, JSON) as temporary:
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def plain(value: Any) -> Any:
+    """A value that JSON can hold: arrays as lists, numbers that are not finite as null."""
+    import numpy as np
+
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return plain(dataclasses.asdict(value))
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
+
+
+_REDRAWN_S, _SHORT_S = 1.0, 5.0
+
+
+def progress_bar(label: str, *, left: bool = True) -> Bar:
+    """A `mechanics.progress.Progress` on standard error; call `.close()`, or use it as a context manager.
+
+    left: False where the stage's own words say what is left.
+    """
+    return Bar(label, left)
+
+
+class Bar:
+    """The one display of every wait: on a terminal a bar with the stage and what is left of it, which goes on
+    while a stage tells of nothing; elsewhere nothing, so that standard error holds errors alone."""
+
+    def __init__(self, label: str, left: bool = True) -> None:
+        from tqdm import tqdm
+
+        terminal = sys.stderr.isatty()
+        self._bar = tqdm(
+            total=100.0,
+            desc=label,
+            file=sys.stderr,
+            disable=not terminal,
+            bar_format="{percentage:3.0f}% {bar:16} {elapsed} {desc}",
+            leave=True,
+        )
+        self._terminal, self._label, self._stage, self._share = terminal, label, "", 0.0
+        self._says_left, self._left, self._closed = left, Remaining(), threading.Event()
+        self._left.tell(0.0)
+        self._thread = threading.Thread(target=self._go_on, name="progress", daemon=True)
+        if terminal:
+            self._thread.start()
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        self._stage, self._share = stage, min(max(fraction, 0.0), 1.0)
+        self._left.tell(self._share)
+        if self._terminal:
+            self._draw()
+
+    def _words(self) -> str:
+        """Label and stage, and what is left."""
+        late = self._says_left and self._left.elapsed_s > _SHORT_S
+        about = ": ".join(word for word in (self._label, self._stage) if word)
+        return ", ".join(word for word in (about, self._left.words() if late else "") if word)
+
+    def _draw(self) -> None:
+        width = max(20, shutil.get_terminal_size().columns - 30)
+        self._bar.set_description_str(self._words()[:width], refresh=False)
+        self._bar.n = 100.0 * self._share
+        self._bar.refresh()
+
+    def _go_on(self) -> None:
+        while not self._closed.wait(_REDRAWN_S):
+            self._draw()
+
+    def close(self) -> None:
+        """Finish the bar's line."""
+        self._closed.set()
+        if self._terminal:
+            self._thread.join()
+        self._bar.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,173 @@
+"""A check-up: each finding with what to do, and a picture of the stretch where it shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.checks.checkup import Checkup
+from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.samples import CHANNELS
+from palpate.show.page import Page, file_words, subplots
+from palpate.show.quantities import readable
+from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
+from palpate.show.scenery import add_path, look_around
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from pyvista import Plotter
+
+QUIET = ("#8d99ae", "#b8b08d", "#a3b899")
+_LOUD = ("#c1121f", "#9d4edd", "#d97706")
+_MOST = 8000
+_MARGIN = 0.35
+
+
+def lines(result: Checkup) -> list[str]:
+    """What `print` says, with units."""
+    found, grave = len(result.findings), len(result.grave)
+    looked = "samples, presses and modulus" if result.full else "samples and presses"
+    head = f"{result.recording.name}, {result.recording.duration_s:.1f} s: "
+    if not found:
+        return [f"{head}nothing to find fault with in its {looked}"]
+    return [f"{head}{found} finding{'s' * (found > 1)}, {grave} grave", *(f.line() for f in result.findings)]
+
+
+def as_json(result: Checkup) -> dict[str, Any]:
+    """The figures of `palpate check --json`, keys with units."""
+    return {
+        "recording": result.recording.name,
+        "grave": len(result.grave),
+        "findings": [f.as_json() for f in result.findings],
+        "seen": [{"what": words, "value": value, "usual": usual} for words, value, usual in result.seen],
+    }
+
+
+def place(result: Checkup, plotter: Plotter) -> None:
+    """The tip's path, the stretches in question coloured."""
+    flagged = np.zeros(len(result.recording.t))
+    for k, finding in enumerate(reversed(result.findings)):
+        if finding.stretch:
+            a, b = np.searchsorted(result.recording.t, finding.stretch)
+            flagged[a : b + 1] = k + 1
+    add_path(plotter, result.recording.position, flagged, "finding (0: none)")
+    look_around(plotter, np.array([0.0, 0.0, 1.0]), result.recording.position)
+
+
+def draw(result: Checkup, ax: Axes) -> None:
+    """Length of the force (N) over time (s); the findings' stretches shaded, grave ones red."""
+    recording = result.recording
+    rows = _rows(0, len(recording.t))
+    ax.plot(recording.t[rows], recording.force_n[rows], lw=0.7, color=FORCE_COLOUR)
+    length = recording.duration_s
+    for k, finding in enumerate(reversed(result.findings)):
+        if finding.stretch is None:
+            continue
+        begin, end = finding.stretch
+        colour = PEAK_COLOUR if finding.grave else PHASE_COLOUR
+        ax.axvspan(begin, max(end, begin + 0.003 * length), color=colour, alpha=0.25, zorder=0)
+        number = len(result.findings) - k
+        ax.text(begin, 0.97, str(number), transform=ax.get_xaxis_transform(), va="top", fontsize=9)
+    ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(recording.t[0], recording.t[-1]))
+
+
+def report(result: Checkup, path: Path | str) -> Path:
+    """Write the page, and its figures as PNGs into the folder PATH without suffix; returns its path."""
+    path = Path(path)
+    path = path if path.suffix else path.with_suffix(".html")
+    page = Page(f"Check-up of {result.recording.name}")
+    page.save(path.with_suffix(""), tell(result, page))
+    page.result(as_json(result))
+    return page.write(path)
+
+
+def tell(result: Checkup, page: Page) -> dict[str, Figure]:
+    """The findings, each with its stretch, into a page; returns the pictures by name."""
+    figures = {f"finding-{k + 1}": stretch_figure(result.recording, f) for k, f in enumerate(result.findings)}
+    whole, ax = subplots(1, 1, figsize=(10, 3))
+    draw(result, ax)
+    figures["whole"] = whole
+    page.lead(lines(result)[0] + ".")
+    page.paragraph(_meaning(result))
+    page.next_steps(next_steps(result))
+    if result.findings:
+        page.table(
+            ["finding", "grave", "adds to the modulus's error", "how sure"],
+            [[f.name, "grave" if f.grave else "-", _share(f.error), f.sure] for f in result.findings],
+        )
+    shaded = "; the stretches of the findings are shaded" if result.findings else ""
+    page.figure(whole, f"Force over the whole recording{shaded}.")
+    for k, finding in enumerate(result.findings):
+        page.heading(f"{k + 1}. {finding.name}{' (grave)' if finding.grave else ''}")
+        page.paragraph(f"{finding.saw[0].upper()}{finding.saw[1:]}.")
+        page.paragraph(f"How sure: {finding.sure}. What to do: {finding.todo}.")
+        page.figure(figures[f"finding-{k + 1}"], _caption(finding))
+    page.heading("What was measured")
+    page.table(["quantity", "here", "usual"], [_seen(*row) for row in result.seen])
+    return figures
+
+
+def _seen(words: str, here: float, usual: float) -> list[object]:
+    label, values = readable(words, [here, usual])
+    return [label, *values]
+
+
+def _meaning(result: Checkup) -> str:
+    if not result.findings:
+        return "Nothing stands out that would move the modulus beyond its interval."
+    if any(f.grave for f in result.findings):
+        return "The model could be another object's: `palpate reconstruct` refuses this without --force."
+    return "The modulus's interval is widened by what was found; the model can be made as it is."
+
+
+def next_steps(result: Checkup) -> list[str]:
+    """What to do with the answer."""
+    if grave := [f.todo for f in result.findings if f.grave]:
+        return grave[:1]
+    return [f"make a model of it: `palpate reconstruct {file_words(result.recording.path, 'REC')} -o MODEL`"]
+
+
+def stretch_figure(recording: Recording, finding: Finding) -> Figure:
+    """Position (mm, from its mean) and force (N) around the finding's stretch; its channels stand out."""
+    figure, axes = subplots(2, 1, figsize=(10, 4.6), sharex=True)
+    whole = (float(recording.t[0]), float(recording.t[-1]))
+    begin, end = finding.stretch or whole
+    margin = max(_MARGIN * (end - begin), 10 * float(np.median(np.diff(recording.t))))
+    a, b = np.searchsorted(recording.t, [begin - margin, end + margin])
+    rows = _rows(int(a), max(int(b), int(a) + 2))
+    t = recording.t[rows]
+    position = 1e3 * (recording.position[rows] - recording.position[rows].mean(axis=0))
+    marker = "." if len(t) < 150 else None
+    for ax, values, names in zip(
+        axes, (position, recording.force_on_tool[rows]), (CHANNELS[:3], CHANNELS[3:]), strict=True
+    ):
+        for k, name in enumerate(names):
+            loud = name in finding.channels
+            ax.plot(t, values[:, k], marker=marker, lw=1.5 if loud else 0.8, zorder=3 if loud else 2,
+                    color=_LOUD[k] if loud else QUIET[k], label=name)  # fmt: skip
+        if (begin, end) != whole:
+            ax.axvspan(begin, end, color=PHASE_COLOUR, zorder=0)
+        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    axes[0].set_ylabel("position less its mean [mm]")
+    axes[1].set(ylabel="force on the tool [N]", xlabel="time [s]")
+    return figure
+
+
+def _rows(a: int, b: int) -> np.ndarray:
+    """Sample numbers of [a, b), thinned to what a picture shows."""
+    return np.arange(a, b, max(1, (b - a) // _MOST))
+
+
+def _caption(finding: Finding) -> str:
+    where = "the whole recording"
+    if finding.stretch is not None:
+        where = f"{finding.stretch[0]:.2f} to {finding.stretch[1]:.2f} s"
+    return f"{finding.name}: {where}" + (f"; {', '.join(finding.channels)}" if finding.channels else "") + "."
+
+
+def _share(error: float) -> str:
+    return f"{100 * error:.0f} %" if np.isfinite(error) else "unknown"

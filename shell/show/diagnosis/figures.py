@@ -1,0 +1,180 @@
+"""The pictures of a diagnosis, and its view: where on the object, one press, what each effect takes away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.model.model import Model
+from palpate.render.surface.felt_surface import felt_surface
+from palpate.show.bars import draw_errors, height_of
+from palpate.show.diagnosis.gaps import (
+    beside,
+    diagnosed,
+    gap_at,
+    gap_of,
+    press_gaps,
+    ranked,
+    residual_with,
+    shown_entries,
+    sideways,
+    sites_of,
+    worst_press,
+)
+from palpate.show.diagnosis.words import spoken
+from palpate.show.model_view import facing, usual_colourings, view_of_presses
+from palpate.show.object3d import Colours, draw_object, view_axes
+from palpate.show.page import new_figure
+from palpate.show.quantities import ERROR, MODULUS
+from palpate.show.view3d import View
+from palpate.show.view3d_parts import Colouring, Line
+
+MEASURED, IDEAL, IMPROVED, RIVAL = "#1d3557", "#e76f51", "#2a9d8f", "#e9b44c"
+
+
+def first_picture(model: Model, result: Diagnosis) -> Any:
+    """Where on the object, and how it looks in the press that differs most."""
+    figure = new_figure(10, 3.9, layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[1.1, 1.05])
+    _object(left, model, result)
+    _press(right, result, worst_press(result))
+    right.set_title("a press there", fontsize=11)
+    right.legend(fontsize=8.5, frameon=False)
+    return figure
+
+
+def gains_picture(result: Diagnosis) -> Any:
+    """How far the simulation is off, as it is and with what was found."""
+    figure = new_figure(5.5, height_of(len(_bars(result))), layout="constrained")
+    draw(result, figure.subplots())
+    return figure
+
+
+def view(result: Diagnosis) -> View:
+    """The object by its gap; each press as measured, simulated, with what was found and with each effect."""
+    model = diagnosed(result)[1]
+    t, before, after = gap_of(result)
+    each = press_gaps(result)
+
+    def line(name: str, residual: np.ndarray, kind: str, shown: bool = True) -> Line:
+        return Line(name, t.local_force - residual, kind, shown)
+
+    lines = [line("measured", np.zeros_like(before), "measured"), line("simulated", before, "rendered")]
+    if result.effects:
+        lines.append(line("with what was found", after, "found"))
+    lines += [
+        line(f"with {beside(result, e.name)}", residual, "effect", False)
+        for e in shown_entries(result)
+        if (residual := residual_with(result, e.name)) is not None
+    ]
+    error = Colouring(
+        ERROR,
+        None,
+        each,
+        "Measured less simulated, root mean square over each press; between presses what is near, "
+        "paler where nobody touched.",
+    )
+    force = "sideways" if sideways(result) else "into"
+    return view_of_presses(model, t, [error, *usual_colourings(model, t)], lines, worst_press(result), force)
+
+
+def _object(ax: Any, model: Model, result: Diagnosis) -> None:
+    """Seen from where the largest difference is in front: a ring is never drawn through the object."""
+    places = sites_of(result)
+    values = gap_at(result, felt_surface(model).points) * ERROR.scale
+    worst = np.array(result.where.worst[0][:3])
+    t = gap_of(result)[0]
+    azimuth = facing(model.support.normal, t.normal[int(np.argmin(np.linalg.norm(t.point - worst, axis=1)))])
+    draw_object(ax, model, Colours(values, ERROR), touches=places, azimuth_deg=azimuth)
+    seen = view_axes(model.support.normal, 25.0, azimuth)
+    x, y, _ = (worst - model.mesh.points.mean(axis=0)) @ seen.T * 1e3
+    ax.scatter([x], [y], s=190, facecolors="none", edgecolors=IMPROVED, linewidths=2.2, zorder=4)
+    ax.set_title("on the object (dots: places touched, ring: largest)", fontsize=11)
+
+
+def modulus_picture(better: Model, result: Diagnosis) -> Any:
+    """Young's modulus right under the surface, in the model with what was found."""
+    mesh = better.mesh
+    modulus = better.material.young_modulus_pa * better.surface_ratio[mesh.touchable_elements]
+    centres = mesh.points[mesh.touchable_surface[:, :3]].mean(axis=1)
+    near = np.exp(-((cdist(felt_surface(better).points, centres) / better.mesh_size_m) ** 2)) + 1e-12
+    figure = new_figure(6, 3.9, layout="constrained")
+    colours = Colours(near @ modulus / near.sum(axis=1) / 1e3, replace(MODULUS, name="Young's modulus"))
+    draw_object(figure.subplots(), better, colours, touches=sites_of(result))
+    return figure
+
+
+def _press(ax: Any, result: Diagnosis, press: int) -> None:
+    t, before, after = gap_of(result)
+    rows = (t.press == press) & t.counted
+    clock = t.t[rows] - t.onset_s[press]
+    measured = t.local_force[rows]
+    along = np.array([1.0, 0.0, 0.0])
+    if sideways(result):
+        pull = (measured * np.linalg.norm(measured[:, 1:], axis=1)[:, None]).sum(axis=0) * [0.0, 1.0, 1.0]
+        along = pull / max(float(np.linalg.norm(pull)), 1e-12)
+    ax.plot(clock, measured @ along, color=MEASURED, lw=1.8, label="measured")
+    ax.plot(clock, (measured - before[rows]) @ along, color=IDEAL, lw=1.2, label="simulated")
+    if result.effects:
+        ax.plot(
+            clock, (measured - after[rows]) @ along, color=IMPROVED, lw=1.2, ls="--",
+            label="simulated with what was found",
+        )  # fmt: skip
+    ax.set(
+        xlabel="time since first touch [s]",
+        ylabel=f"force {'sideways' if sideways(result) else 'into the surface'} [N]",
+    )
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def _bars(result: Diagnosis) -> list[tuple[str, float, str]]:
+    """(what is simulated, gap N, colour): as it is, with what was found, with each that is not ruled out;
+    where nothing was found, with the best that was tried."""
+    bars = [("the simplest simulation", result.gap_before_n, IDEAL)]
+    if result.effects:
+        bars.append((f"with {spoken(result.effects)}", result.gap_after_n, IMPROVED))
+    rest = [e for e in shown_entries(result) if e.name not in result.effects]
+    if not result.effects and not result.candidates:
+        rest = sorted(rest, key=lambda e: e.gap_after_n)[:1]
+    return bars + [(f"with {beside(result, e.name)}", e.gap_after_n, RIVAL) for e in rest]
+
+
+def draw(result: Diagnosis, ax: Any) -> None:
+    """How far the simulation is off at places not fitted (mN rms): as it is, with what was found (green),
+    with what is not ruled out (yellow); the line is the sensor's noise."""
+    draw_errors(ax, _bars(result), result.noise_n, "typical difference from the measured force [mN]")
+
+
+def curve_pictures(result: Diagnosis) -> list[tuple[Any, str]]:
+    """The mean gap along depth and along speed, a picture each."""
+    made = []
+    for name, along in (
+        ("depth (mm)", "depth [mm]"),
+        ("speed of pressing (mm/s)", "speed of the tip, going in positive [mm/s]"),
+    ):
+        figure = new_figure(5.2, 2.9, layout="constrained")
+        ax = figure.subplots()
+        x, mean, error = result.where.curves[name]
+        ax.errorbar(x, mean * 1e3, error * 1e3, marker="o", ms=4, color=MEASURED)
+        ax.axhline(0, color="#999999", lw=0.8)
+        ax.set(xlabel=along, ylabel="measured less simulated [mN]")
+        ax.spines[["top", "right"]].set_visible(False)
+        of = "depth" if "depth" in name else "speed of the tip"
+        made.append((figure, f"Mean difference at each {of}."))
+    return made
+
+
+def press_pictures(result: Diagnosis, count: int = 3) -> list[tuple[Any, str]]:
+    """Force against time of the presses with the largest gap, after the first, a picture each."""
+    made = []
+    for press in [press for press in ranked(result) if press != worst_press(result)][:count]:
+        figure = new_figure(5.2, 2.9, layout="constrained")
+        ax = figure.subplots()
+        _press(ax, result, int(press))
+        ax.legend(fontsize=8.5, frameon=False)
+        made.append((figure, f"Press {int(press) + 1}."))
+    return made

@@ -1,0 +1,277 @@
+"""A diagnosis in words that need no knowledge of the program: the answer, what it means, how sure it is,
+where it shows; quantities with units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.effects.base import Scope
+from palpate.mechanics.effects.registry import effect
+from palpate.show.diagnosis.gaps import depth_contrast, in_model
+from palpate.show.diagnosis.parameters import short
+
+AXIS_WORDS = {
+    "depth": "how deep the press is",
+    "rate": "how fast the press is",
+    "phase": "whether the tip goes in, rests or comes out",
+    "direction": "whether the force is sideways or into the surface",
+    "space": "the place on the object",
+    "order": "when in the session it was touched",
+    "repeat": "whether a place is touched for the first time or again",
+    "free_air": "what the sensor reads in free air, touching nothing",
+}
+
+ERROR_WORDS = {
+    "sensor": "noise of the force sensor",
+    "repeatability": "touching one place again does not give the same force",
+    "shape": "the object's shape is not known where nobody touched",
+}
+
+
+def meaning(name: str) -> str:
+    """What an effect is, for a person who has never heard of it."""
+    return effect(name).plain_words or effect(name).words
+
+
+LITTLE = 0.1
+"""A share of the difference below which it is not said to depend on something."""
+
+
+def spoken(names: tuple[str, ...] | list[str], last: str = "and") -> str:
+    """Effects' names as a list in a sentence."""
+    words = [n.replace("_", " ") for n in names]
+    return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def between_words(low: float, high: float) -> str:
+    """An interval of shares: '85 to 91 %', with a decimal where its ends would be one number."""
+    digits = 0 if round(100 * low) != round(100 * high) else 1
+    return f"{100 * low:.{digits}f} to {100 * high:.{digits}f}\u00a0%"
+
+
+def force_words(newtons: float) -> str:
+    """A force in millinewtons, in newtons from one on."""
+    return f"{newtons:.2f} N" if newtons >= 1 else f"{newtons * 1e3:.0f} mN"
+
+
+def percent(share: float) -> str:
+    """A share as a percentage, which no line breaks."""
+    return f"{100 * share:.0f}\u00a0%"
+
+
+def chance_words(p: float) -> str:
+    """A p value as one would say it."""
+    if p < 0.0095:
+        return "less than once in 100"
+    return f"{100 * p:.0f} times in 100" if p < 0.995 else "always"
+
+
+def share_words(value: float | None) -> str:
+    """A share of the gap that is closed."""
+    if value is None:
+        return "-"
+    return percent(value) if value >= 0 else "none (worse)"
+
+
+def missing(result: Diagnosis) -> tuple[str, ...]:
+    """The effects that were named and that the model does not have yet."""
+    return tuple(name for name in result.effects if name not in in_model(result))
+
+
+def verdict(result: Diagnosis) -> str:
+    """The answer in one sentence."""
+    left_out, there = spoken(missing(result)), spoken([n for n in result.effects if n in in_model(result)])
+    rivals = spoken(result.candidates, "or")
+    if result.kind == "none":
+        return "Measured and simulated force agree: nothing is missing that these touches could show."
+    if result.kind == "unknown":
+        return "Measured and simulated force differ, and nothing that this program knows explains it" + (
+            f"; {rivals} is suspected." if rivals else "."
+        )
+    if not left_out:
+        said = f"Nothing new is missing: what these touches show is {there}, which the model already has"
+    elif result.kind == "ambiguous":
+        said = f"The simulation leaves something out: most likely {left_out}"
+    else:
+        said = f"The simulation leaves out {left_out}"
+    if left_out and there:
+        said += f" (the model already has {there})"
+    if result.kind == "ambiguous":
+        return f"{said}; but these touches cannot rule out {rivals}."
+    if "unknown" in result.kind:
+        return f"{said}. Something else is missing that this program does not know."
+    return f"{said}."
+
+
+def consequence(result: Diagnosis, force_rms_n: float) -> str:
+    """What the answer means for a hand. force_rms_n: typical force of a touch."""
+    before, noise = force_words(result.gap_before_n), force_words(result.noise_n)
+    size = f"{percent(result.gap_before_n / force_rms_n)} of its force"
+    if result.kind == "none":
+        return f"A typical touch is simulated to {before}, {size}; the sensor's noise alone is {noise}."
+    words = "; ".join(_what_it_is(result, name) for name in missing(result) or result.effects)
+    said = f"{words[:1].upper()}{words[1:]}. " if words else ""
+    if not result.effects:
+        return f"A typical touch is off by {before}, {size}; the sensor's noise alone is {noise}."
+    after, them = force_words(result.gap_after_n), "it" if len(result.effects) == 1 else "them"
+    if result.gap_after_n >= 0.98 * result.gap_before_n:
+        return f"{said}A typical touch is off by {before}, {size}, with or without {them}."
+    near = result.gap_after_n < 1.25 * result.noise_n
+    rest = f", about the sensor's noise ({noise})" if near else f"; the sensor's noise is {noise}"
+    return (
+        f"{said}Without {them} a simulated touch is typically off by {before}, {size}; with {them} by "
+        f"{after}{rest}."
+    )
+
+
+def _what_it_is(result: Diagnosis, name: str) -> str:
+    """An effect and its size: 'the tip slides instead of sticking (friction coefficient 0.12)'."""
+    keys = next((e.parameters for e in result.entries if e.name == name), {})
+    in_words = effect(name).keys_in_words
+    said = in_words(keys) if in_words is not None and keys else short(keys)
+    return meaning(name) + (f" ({said})" if said else "")
+
+
+def answers(result: Diagnosis) -> list[tuple[str, str, str]]:
+    """(question, answer, sentences) of how sure, where, how far."""
+    return [_how_sure(result), _where(result), _how_far(result)]
+
+
+def _how_sure(result: Diagnosis) -> tuple[str, str, str]:
+    question = "How sure is it?"
+    if result.kind == "none":
+        return question, "As sure as these touches are", (
+            "Smaller effects than the noise may be there; deeper, faster or longer touches would show them."
+        )  # fmt: skip
+    if result.candidates:
+        also = "; ".join(f"{n.replace('_', ' ')}: {meaning(n)}" for n in result.candidates)
+        text = f"Not ruled out: {also}. The touch proposed below would tell."
+        return question, "These touches cannot tell", text
+    if not result.effects:
+        return question, "The gap is there, its cause is open", (
+            "None of the effects that were tried takes it away at places that the fit had not seen."
+        )  # fmt: skip
+    sure = {e.name: e.probability for e in result.entries if e.name in result.effects}
+    least = min(sure, key=lambda name: sure[name])
+    text = (
+        f"Of 100 such answers on simulated recordings whose truth is known, {100 * sure[least]:.0f} "
+        f"{'or more ' if len(sure) > 1 else ''}were right. Every other "
+        "effect that was tried explains less at places that the fit had not seen."
+    )
+    if len(sure) == 1:
+        return question, f"{percent(sure[least])} sure", text
+    each = ", ".join(f"{name.replace('_', ' ')} {percent(share)}" for name, share in sure.items())
+    return question, each[0].upper() + each[1:], text
+
+
+def _where(result: Diagnosis) -> tuple[str, str, str]:
+    """Where it differs, told so that it fits what was named: a component of the force is no cause."""
+    axis = result.where.leading
+    x, y, z, rms = result.where.worst[0]
+    largest = f"({x * 1e3:.0f}, {y * 1e3:.0f}, {z * 1e3:.0f}) mm"
+    question = "Where does it show?"
+    if result.kind == "none":
+        text = (
+            "No place, depth or speed stands out beyond what noise, first touch and shape may do. The "
+            f"largest difference is {force_words(rms)}, at {largest} (the press shown)."
+        )
+        return question, "Nowhere in particular", text
+    # the gap of held-out places may exceed what a fit leaves at the worst place: the smaller one is not said
+    size = f": {force_words(rms)}" if rms > result.gap_before_n else ""
+    there = f"It is largest at {largest} (the press shown){size}."
+    if axis.share < LITTLE:
+        most = f"What it goes with most is {AXIS_WORDS[axis.axis]}, and that is {percent(axis.share)} of it."
+        return question, "Everywhere alike", f"{most} {there}"
+    chance = "" if axis.p < 0.05 else " That may be chance."
+    if axis.axis != "direction":
+        text = f"{percent(axis.share)} of the difference goes with it.{chance} {there}"
+        return question, f"It changes with {AXIS_WORDS[axis.axis]}", text
+    text = f"{percent(axis.share)} of the difference lies along the surface, not into it.{chance} "
+    headline, times = "In the sideways force", depth_contrast(result)
+    of_depth = any(effect(n).scope in (Scope.PRESS, Scope.EVERYWHERE) for n in result.effects)
+    if of_depth and np.isfinite(times) and times > 1.5:
+        headline += " of deep presses"
+        text += f"In the deepest third of the touches it is {times:.1f} times that in the shallowest. "
+    return question, headline, text + there
+
+
+def _how_far(result: Diagnosis) -> tuple[str, str, str]:
+    question = "How far does it shrink?"
+    before, noise = force_words(result.gap_before_n), force_words(result.noise_n)
+    typical = "Root mean square at places that the fit had not seen"
+    if result.effects and result.gap_closed is not None and result.gap_closed_ci95 is not None:
+        low, high = result.gap_closed_ci95
+        after = force_words(result.gap_after_n)
+        if result.gap_after_n >= 0.98 * result.gap_before_n:
+            return question, f"{before}, and not less", (
+                f"{typical}. What was found does not lower it there. The sensor's own noise is {noise}."
+            )  # fmt: skip
+        text = (
+            f"{typical}. The sensor's own noise is {noise}: {percent(result.gap_closed)} of what lies above "
+            f"it is gone (95 % sure: {between_words(low, high)})."
+        )
+        return question, f"From {before} to {after}", text
+    text = f"{typical}: {before}. The sensor's own noise is {noise}."
+    if result.kind == "none":
+        return question, "There is nothing to shrink", text
+    return question, f"It stays at {before}", text + " With no effect found, nothing of it is gone."
+
+
+def lines(result: Diagnosis) -> list[str]:
+    """What a terminal says: the answer, what it is, how far it goes, where it shows, how sure it is."""
+    ends = [f"{each} stands at the end of its range" for each in result.at_bound]
+    text = [f"verdict: {'; '.join([verdict(result), *ends])}"]
+    text += [f"which: {_named(result, name)}" for name in result.effects]
+    off = f"how far: a typical touch is {force_words(result.gap_before_n)} off"
+    noise = f"; the sensor's noise is {force_words(result.noise_n)}"
+    if result.gap_closed is not None and result.gap_closed_ci95 is not None and result.effects:
+        text.append(f"{off}, {force_words(result.gap_after_n)} with what was found{noise}")
+        text.append(
+            f"  {percent(result.gap_closed)} of what lies above the noise is gone (95 % sure: "
+            f"{between_words(*result.gap_closed_ci95)}), at places that were not fitted"
+        )
+    else:
+        text.append(f"{off}{noise}")
+    if result.constant_n is not None:
+        text.append(f"  a constant push instead of a model would be {force_words(result.constant_n)} off")
+    _, where, because = _where(result)
+    text.append(f"where: {_small(where)}")
+    text.append(f"  {because}".replace(" (the press shown)", ""))
+    _, sure, _ = _how_sure(result)
+    text.append(f"how sure: {_small(sure)}")
+    text += [f"  {reason}" for reason in result.reasons]
+    if result.exact is not None:
+        text.append(f"touched places are solved: {result.exact.said}")
+    if result.next_touch is not None and result.unsettled:
+        text.append(f"next touch: {touch_words(result)}")
+    if result.left_out:
+        text.append(
+            f"not tried (these presses cannot show it, or --fast leaves it out): {spoken(result.left_out)}"
+        )
+    return [line.replace("\u00a0", " ") for line in text]
+
+
+def _small(words: str) -> str:
+    return words[:1].lower() + words[1:]
+
+
+def _named(result: Diagnosis, name: str) -> str:
+    there = ", which the model already has" if name in in_model(result) else ""
+    return f"{name.replace('_', ' ')}: {_what_it_is(result, name)}{there}"
+
+
+def touch_words(result: Diagnosis) -> str:
+    """Where and how to touch next, and what that would tell."""
+    touch = result.next_touch
+    assert touch is not None
+    parted = " from ".join(n.replace("_", " ") for n in touch.separates)
+    if touch.kind != "press":
+        return f"to tell {parted}: {touch.why}"
+    x, y, z = (1e3 * v for v in (touch.x, touch.y, touch.z))
+    direction = ", ".join(f"{round(d, 2) + 0.0:g}" for d in touch.direction)
+    hold = f", and hold for {touch.hold_s:.1f} s" if touch.hold_s > 0.05 else ""
+    return (
+        f"to tell {parted}, press at ({x:.0f}, {y:.0f}, {z:.0f}) mm in the direction ({direction}), "
+        f"{touch.depth_m * 1e3:.1f} mm deep at {touch.speed_m_per_s * 1e3:.0f} mm/s{hold}: {touch.why}"
+    )

@@ -1,0 +1,189 @@
+"""An exploration: what became known from touch to touch, where each was and why, and why it ended."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.diagnosis.explore.explored import Explored, Step
+from palpate.show.page import Page, file_words, subplots
+from palpate.show.quantities import ORDER, UNCERTAINTY, softness
+from palpate.show.view3d import View
+from palpate.show.view3d_parts import Colouring, Thing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
+
+MODULUS_COLOUR, SURFACE_COLOUR, GOAL_COLOUR = "#1d3557", "#e08e1b", "#2a9d8f"
+_REACHED = {True: "yes", False: "not yet"}
+_NAMES = {"modulus": "Young's modulus", "surface": "surface", "cause": "one cause alone"}
+
+
+def lines(result: Explored) -> list[str]:
+    """What `print` says, with units."""
+    state = result.state
+    return [
+        f"{state.made} presses in {state.seconds:.0f} s: {state.words or 'nothing is known yet'}",
+        f"  {_ended(result)}",
+    ]
+
+
+def _ended(result: Explored) -> str:
+    return f"{'ended' if result.last.kind == 'stop' else 'not ended, next'}: {result.last.why}"
+
+
+def next_steps(result: Explored) -> list[str]:
+    """What to do with what was touched."""
+    recording = file_words(result.path, "REC")
+    steps = [f"make a model of it: `palpate reconstruct {recording} -o MODEL`"]
+    if result.last.kind != "stop":
+        steps.append(f"go on: the same command with `--continue {recording}`")
+    return steps
+
+
+def _known(steps: tuple[Step, ...]) -> list[Step]:
+    return [s for s in steps if np.isfinite(s.state.modulus_pa)]
+
+
+def draw(result: Explored, ax: Axes) -> None:
+    """Young's modulus (kPa) with its 95 % interval over the presses made."""
+    known = _known(result.steps)
+    made = [s.state.made for s in known]
+    low, high = (np.array([s.state.modulus_ci95_pa[k] for s in known]) / 1e3 for k in (0, 1))
+    ax.fill_between(made, low, high, color=MODULUS_COLOUR, alpha=0.18, lw=0, label="95 % sure")
+    modulus = [s.state.modulus_pa / 1e3 for s in known]
+    ax.plot(made, modulus, "o-", ms=4, color=MODULUS_COLOUR, label="estimate")
+    _over_presses(ax, "Young's modulus [kPa]")
+    if known:
+        last = modulus[-1]
+        ax.set_ylim(max(0.0, 0.4 * last), 1.6 * last)
+        ax.legend(frameon=False, loc="upper right")
+
+
+def _over_presses(ax: Axes, what: str) -> None:
+    ax.set(xlabel="presses made", ylabel=what)
+    ax.locator_params(axis="x", integer=True)
+
+
+def _draw_surface(result: Explored, ax: Axes) -> None:
+    """mm within which 95 % of the surface lies, over the presses made, with the goal."""
+    known = [s for s in result.steps if np.isfinite(s.state.surface_error_m)]
+    error = [1e3 * s.state.surface_error_m for s in known]
+    ax.plot([s.state.made for s in known], error, "o-", ms=4, color=SURFACE_COLOUR, label="estimate")
+    if result.goals.surface_within_m is not None:
+        goal = 1e3 * result.goals.surface_within_m
+        ax.axhline(goal, ls="--", lw=1, color=GOAL_COLOUR, label="goal")
+    _over_presses(ax, "95 % of the surface within [mm]")
+    ax.set_ylim(bottom=0)
+    if known:
+        ax.legend(frameon=False, loc="upper right")
+
+
+def place(result: Explored, plotter: Plotter) -> None:
+    """The surface so far, its touches numbered by colour."""
+    import pyvista
+
+    from palpate.show.scenery import OBJECT_COLOUR, add_dots
+
+    surface, touched = result.estimate.surface, _touched(result)
+    if surface is not None:
+        faces = pyvista.PolyData.from_regular_faces(surface.vertices, surface.triangles)
+        plotter.add_mesh(faces, color=OBJECT_COLOUR, smooth_shading=True)
+    add_dots(plotter, touched, np.arange(1.0, len(touched) + 1), label=ORDER.label)
+
+
+def _touched(result: Explored) -> np.ndarray:
+    """(p, 3) m, where the surface was met."""
+    found = result.estimate.exploration
+    return np.zeros((0, 3)) if found is None else found.presses.point
+
+
+def view(result: Explored) -> View | None:
+    """The surface so far, to be turned; None where there are too few touches for one."""
+    surface, touched = result.estimate.surface, _touched(result)
+    if surface is None:
+        return None
+    up = surface.support_normal
+    free = (surface.vertices - surface.support_point) @ up > 1e-6
+    thing = Thing(surface.vertices, surface.triangles, free, surface.support_point, up)
+    unsure = np.where(free, surface.uncertainty_m, np.nan)
+    words = "Standard deviation of the surface along its normal: the next touch goes where it tells most."
+    order = np.arange(1.0, len(touched) + 1)
+    return View(
+        thing,
+        touched,
+        [
+            Colouring(UNCERTAINTY, unsure, None, words),
+            Colouring(ORDER, None, order, "Each dot is where a press met the surface, in order of time."),
+        ],
+    )
+
+
+def report(result: Explored, path: Path | str) -> Path:
+    """Write the page; returns its path."""
+    path = Path(path)
+    path = path if path.suffix else path.with_suffix(".html")
+    state = result.state
+    page = Page(f"Exploration of {Path(result.path).name.split('.')[0] or 'an object'}")
+    page.lead(f"{lines(result)[0]}.")
+    if np.isfinite(state.modulus_pa):
+        page.paragraph(f"About as soft as {softness(state.modulus_pa)}. The exploration {_ended(result)}.")
+    else:
+        page.paragraph(f"The exploration {_ended(result)}.")
+    if state.trouble:
+        page.paragraph(f"The last touch could not be used: {state.trouble}.")
+    page.next_steps(next_steps(result))
+    page.table(
+        ["goal", "now", "asked for", "reached"],
+        [[_NAMES[g.name], _goal(g.name, g.now), _goal(g.name, g.goal), _REACHED[g.met]] for g in state.goals],
+    )
+    pictures = [subplots(1, 1, figsize=(5, 3.4)) for _ in range(2)]
+    draw(result, pictures[0][1])
+    _draw_surface(result, pictures[1][1])
+    words = ("How the modulus became known, press by press.", "How the surface became known.")
+    page.figures([(figure, each) for (figure, _), each in zip(pictures, words, strict=True)])
+    turned = view(result)
+    if turned is not None:
+        page.heading("Where it was touched")
+        flat, ax = subplots(1, 1, figsize=(5, 4))
+        _draw_places(result, ax)
+        page.view(turned, flat, "The places touched from above, in order; the line is the outline there.")
+    page.heading("Every touch, and why there")
+    page.table(["touch", "asked for because", "known after it"], _rows(result))
+    page.result(result.as_json())
+    return page.write(path)
+
+
+def _goal(name: str, value: float) -> str:
+    if not np.isfinite(value):
+        return "unknown"
+    if name == "surface":
+        return f"{1e3 * value:.2f} mm"
+    return f"{100 * value:.1f} %" if name == "modulus" else f"{100 * (1 - value):.1f} % sure"
+
+
+def _rows(result: Explored) -> list[list[object]]:
+    return [
+        [k, "made before" if s.asked is None else s.asked.why, s.state.trouble or s.state.words or "-"]
+        for k, s in enumerate(result.steps, 1)
+    ]
+
+
+def _draw_places(result: Explored, ax: Axes) -> None:
+    """The touches from above the support, mm, numbered."""
+    from palpate.show.object3d import level_axes
+
+    surface = result.estimate.surface
+    assert surface is not None
+    across = level_axes(surface.support_normal)
+    places = 1e3 * (_touched(result) - surface.support_point) @ across.T
+    edge = 1e3 * (surface.vertices - surface.support_point) @ across.T
+    ax.triplot(edge[:, 0], edge[:, 1], surface.triangles, lw=0.15, color="#b8b0a4")
+    ax.plot(places[:, 0], places[:, 1], "o", ms=5, color="#c1121f")
+    for k, (x, y) in enumerate(places, 1):
+        ax.annotate(str(k), (x, y), xytext=(3, 3), textcoords="offset points", fontsize=8)
+    ax.set_aspect("equal")
+    ax.set(xlabel="x' [mm]", ylabel="y' [mm]")

@@ -1,0 +1,49 @@
+"""A recording: its size in lines, force over time, the tip's path."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from palpate.mechanics.recording.recording import Recording
+from palpate.show.quantities import with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
+
+FORCE_COLOUR, TOUCH_COLOUR, PEAK_COLOUR, PHASE_COLOUR = "#457b9d", "#1d3557", "#c1121f", "#f1e3cf"
+"""Of every picture over time: the force, first touches, peaks (and what is grave), phase I."""
+
+
+def lines(result: Recording) -> list[str]:
+    """What `print` says, with units."""
+    phase, noise = result.boundary_phase, result.force_noise_std_n
+    size = np.ptp(result.position, axis=0) * 1e3
+    return [
+        f"Recording {result.name}: {result.object_name}, {result.duration_s:.1f} s, "
+        f"{len(result.t)} samples at {result.sample_rate_hz:g} Hz",
+        f"  tip radius {with_unit(result.tip_radius_m, 'mm', 1e3)}; path within {size[0]:.0f} x "
+        f"{size[1]:.0f} x {size[2]:.0f} mm; force up to {with_unit(result.force_n.max(), 'N')}"
+        + ("" if noise is None else f"; sensor noise {with_unit(noise, 'mN', 1e3)} an axis"),
+        "  phase I (the base is traced): "
+        + ("not stated, found by reconstruction" if phase is None else f"{phase[0]:g} to {phase[1]:g} s"),
+    ]
+
+
+def draw(result: Recording, ax: Axes) -> None:
+    """Force over time."""
+    ax.plot(result.t, result.force_n, lw=0.7, color=FORCE_COLOUR)
+    if result.boundary_phase is not None:
+        ax.axvspan(*result.boundary_phase, color=PHASE_COLOUR, zorder=0, label="phase I")
+        ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(result.t[0], result.t[-1]))
+
+
+def place(result: Recording, plotter: Plotter) -> None:
+    """The tip's path, coloured by force."""
+    from palpate.show.scenery import add_path, look_around
+
+    add_path(plotter, result.position, result.force_n, "force magnitude [N]")
+    look_around(plotter, np.array([0.0, 0.0, 1.0]), result.position)

@@ -1,0 +1,273 @@
+"""A simulated exploration and the truth about it: the tip's path, the force in time, every press."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.mechanics.frames import tangents
+from palpate.scenes.laboratory.paths import SIDEWAYS
+from palpate.scenes.laboratory.simulate import Simulation
+from palpate.show import recording as measured
+from palpate.show.page import Page, file_words, new_figure
+from palpate.show.quantities import DEPTH, ERROR, ORDER
+from palpate.show.view3d import View
+from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from pyvista import Plotter
+
+_COLOURS = ("#c0392b", "#27ae60", "#2c6fbb")
+
+PRESSES_SHOWN = 7
+"""Presses whose curves are drawn: more would hide one another."""
+
+
+def lines(result: Simulation) -> list[str]:
+    """What `print` says, with units."""
+    recording = result.recording
+    words = [
+        f"Simulation {recording.name}: {recording.t[-1]:.0f} s, {len(result.touches)} touches of the "
+        f"{result.phantom}",
+        f"  effects: {', '.join(n.replace('_', ' ') for n in result.truth['strengths']) or 'none'}",
+    ]
+    for name, size in result.truth.get("sizes", {}).items():
+        left = 1e3 * size["rms_after_best_scale_n"]
+        words.append(
+            f"  {name.replace('_', ' ')} changes the force by {1e3 * size['rms_n']:.3g} mN; {left:.3g} mN "
+            "of that stays when another modulus is fitted"
+        )
+    return words
+
+
+def as_json(result: Simulation) -> dict[str, Any]:
+    """The figures of `palpate simulate --json`, keys with units."""
+    path = result.recording.path
+    return {
+        "recording": None if path is None else str(path),
+        "samples": len(result.recording.t),
+        "duration_s": float(result.recording.t[-1]),
+        "palpations": len(result.touches),
+        "truth": result.truth,
+    }
+
+
+def draw(result: Simulation, ax: Axes) -> None:
+    """Force over time."""
+    measured.draw(result.recording, ax)
+
+
+def place(result: Simulation, plotter: Plotter) -> None:
+    """The tip's path, coloured by force."""
+    measured.place(result.recording, plotter)
+
+
+def report(result: Simulation, path: Path | str) -> Path:
+    """Write one page: what was simulated, the object, and every touch as read beside the ideal object's."""
+    recording, truth = result.recording, result.truth
+    strengths = truth["strengths"]
+    effects = " and ".join(
+        f"{name.replace('_', ' ')} of strength {value:g}" for name, value in strengths.items()
+    )
+    page = Page(f"Simulated exploration of {recording.object_name}")
+    page.lead(
+        f"{len(result.touches)} touches in {recording.t[-1]:.0f} s of an object of "
+        f"{truth['young_modulus_pa'] / 1e3:.1f} kPa, "
+        f"{f'with {effects} (1 is usual)' if effects else 'without any effect'}."
+    )
+    page.paragraph(_meaning(result))
+    page.next_steps(next_steps(result))
+    page.view(
+        view(result),
+        simulation_figure(result),
+        "Path of the tip, force in time, the longest drag or touch, and some presses; grey and dashed is "
+        "what the ideal object would answer to the same hand.",
+    )
+    if truth.get("sizes"):
+        page.heading("How large each effect is")
+        page.table(
+            ["effect", "change of the force [mN]", "left with another modulus [mN]"],
+            [
+                [name.replace("_", " "), *(f"{1e3 * size[key]:.1f}" for key in _SIZES)]
+                for name, size in truth["sizes"].items()
+            ],
+        )
+    page.result(result.as_json())
+    return page.write(path)
+
+
+def next_steps(result: Simulation) -> list[str]:
+    """What to do with the recording."""
+    where = file_words(result.recording.path, "REC")
+    return [
+        f"see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
+        f"`palpate diagnose {where} --model MODEL --report PAGE.html`",
+        "feel it: `palpate touch MODEL`",
+    ]
+
+
+_SIZES = ("rms_n", "rms_after_best_scale_n")
+
+
+def _meaning(result: Simulation) -> str:
+    noise = result.recording.force_noise_std_n
+    words = (
+        "The recording holds what a device would have read; the truth stands beside it and is used by nobody."
+    )
+    if noise:
+        words += f" The sensor's noise is {1e3 * noise:.0f} mN an axis: a smaller effect is hard to see."
+    return words
+
+
+def view(result: Simulation) -> View:
+    """The phantom in the device's frame; each touch as read, without noise, and of the ideal object."""
+    motion, recording = result.motion, result.recording
+    turn, shift = _device(result)
+    rows = [
+        np.flatnonzero((motion.touch == k) & (motion.s > -_BEFORE_MM)) for k in range(len(result.touches))
+    ]
+    normals = np.array([touch.normal for touch in result.touches]) @ turn.T
+    frame = np.repeat([np.stack([n, *tangents(n)]) for n in normals], [len(r) for r in rows], axis=0)
+    chosen = np.concatenate(rows)
+    starts = np.cumsum([0, *map(len, rows)])
+    met = [r[np.argmax(motion.s[r] >= 0.0)] if len(r) else 0 for r in rows]
+    first = np.repeat(met, [len(r) for r in rows])
+    depth_m = motion.s[chosen] * 1e-3
+    read = (1e3 * recording.position[chosen] - shift) @ turn
+    inward = -np.repeat([touch.normal for touch in result.touches], [len(r) for r in rows], axis=0)
+    read_m = depth_m + 1e-3 * ((read - motion.position[chosen]) * inward).sum(axis=1)
+    lines = [
+        Line("read", _turned(frame, recording.force_on_tool[chosen]), "measured", depth_m=read_m),
+        Line("without noise", _turned(frame, result.clean_n[chosen]), "found", False, read_m),
+    ]
+    colourings = [
+        Colouring(ORDER, None, np.arange(1.0, len(rows) + 1), "Each dot is a touch, in order of time."),
+        Colouring(DEPTH, None, np.array([touch.depth for touch in result.touches]) * 1e-3),
+    ]
+    if result.ideal_n is not None:
+        lines.insert(1, Line("ideal object", _turned(frame, result.ideal_n[chosen]), "rendered"))
+        change = result.clean_n - result.ideal_n
+        each = np.array([np.sqrt((change[r] ** 2).sum(axis=1).mean()) for r in rows])
+    if result.ideal_n is not None and each.max() > _LEAST_CHANGE_N:
+        words = "What the effects change, root mean square over each touch; between touches what is near."
+        colourings.append(Colouring(ERROR, None, each, words, name="change of the force"))
+    places = np.array([touch.point for touch in result.touches]) @ turn.T + shift
+    assert result.body is not None, "only what `simulate` returned knows what was explored"
+    phantom = result.body
+    thing = Thing(
+        phantom.vertices @ turn.T + 1e-3 * shift,
+        phantom.faces,
+        phantom.vertices[:, 2] > 1e-4,
+        shift * 1e-3,
+        turn[:, 2],
+    )
+    traces = Traces(starts, depth_m, (chosen - first) * (motion.t[1] - motion.t[0]), lines)
+    return View(thing, places * 1e-3, colourings, traces)
+
+
+def _device(result: Simulation) -> tuple[np.ndarray, np.ndarray]:
+    """(rotation (3, 3), shift (3,) mm) from the object's to the device's frame."""
+    truth = result.truth
+    return np.array(truth["device_from_object_rotation"]), np.array(truth["device_from_object_shift_mm"])
+
+
+def _turned(frame: np.ndarray, force_n: np.ndarray) -> np.ndarray:
+    return np.einsum("nij,nj->ni", frame, force_n)
+
+
+_LEAST_CHANGE_N = 1e-4
+_BEFORE_MM = 1.0
+"""Above the surface: where the curve of a touch begins and ends."""
+
+
+def simulation_figure(result: Simulation) -> Figure:
+    """Four panels: path, force in time, one touch, force against depth; grey and dashed is what the ideal
+    object would answer to the same hand, where the simulation holds it.
+    """
+    figure = new_figure(13, 9, layout="constrained")
+    axes = figure.subplots(2, 2)
+    _path(axes[0, 0], result)
+    _time(axes[0, 1], result)
+    _touch(axes[1, 0], result)
+    _curves(axes[1, 1], result)
+    effects = ", ".join(f"{k} {v:g}" for k, v in result.truth["strengths"].items()) or "no effect"
+    figure.suptitle(f"{result.recording.object_name}: {effects}")
+    return figure
+
+
+def _path(ax, result: Simulation) -> None:
+    motion = result.motion
+    air = motion.touch < 0
+    ax.plot(*motion.position[:, [0, 2]].T, color="#b8c0cc", lw=0.4)
+    traced = air & (np.linalg.norm(motion.trace_force, axis=1) > 0)
+    ax.plot(*motion.position[traced][:, [0, 2]].T, ".", color="#8e44ad", ms=1, label="on the support")
+    pressed = (motion.touch >= 0) & ((motion.s > 0) | (motion.leg == SIDEWAYS))
+    ax.plot(*motion.position[pressed][:, [0, 2]].T, ".", color="#c0392b", ms=1, label="in contact")
+    ax.set(xlabel="x [mm]", ylabel="z [mm]", title="path of the tip, seen along y", aspect="equal")
+    ax.legend(loc="upper right", markerscale=6, fontsize=8)
+
+
+def _time(ax, result: Simulation) -> None:
+    t = result.recording.t
+    ax.plot(t, np.linalg.norm(result.recording.force_on_tool, axis=1), color="#2c6fbb", lw=0.5, label="read")
+    if result.ideal_n is not None:
+        difference = np.linalg.norm(result.clean_n - result.ideal_n, axis=1)
+        ax.plot(t, difference, color="#c0392b", lw=0.6, label="change of the force")
+    parts = [("trace", *result.motion.phase), *result.motion.beside]
+    for k, (kind, start, end) in enumerate(parts):
+        ax.axvspan(start, end, color="#8e44ad" if k % 2 == 0 else "#16a085", alpha=0.12, lw=0)
+        ax.text((start + end) / 2, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center", va="top",
+                fontsize=8, rotation=90)  # fmt: skip
+    ax.set(xlabel="time [s]", ylabel="|force| [N]", title="force in time")
+    ax.legend(fontsize=8)
+
+
+def _touch(ax, result: Simulation) -> None:
+    """The longest drag, or else the longest touch."""
+    motion = result.motion
+    length = np.bincount(motion.touch[motion.touch >= 0])
+    drags = np.array([bool(touch.side.any()) for touch in result.touches])
+    number = int(np.where(drags, length + length.max(), length).argmax())
+    rows = np.flatnonzero((motion.touch == number) & (motion.s > -6))
+    t = result.recording.t[rows]
+    for i, colour in enumerate(_COLOURS):
+        ax.plot(t, result.recording.force_on_tool[rows, i], color=colour, lw=0.4, alpha=0.5)
+        ax.plot(t, result.clean_n[rows, i], color=colour, lw=1.2, label=f"f{'xyz'[i]}")
+        if result.ideal_n is not None:
+            ax.plot(t, result.ideal_n[rows, i], color="#7f8c8d", lw=1, ls="--")
+    touch = result.touches[number]
+    title = f"touch {number}: {touch.kind}, {touch.depth:g} mm deep"
+    ax.set(xlabel="time [s]", ylabel="force on the tool [N]", title=title)
+    ax.legend(fontsize=8)
+
+
+def _curves(ax, result: Simulation) -> None:
+    """Some presses spread over the depths, and the one that differs most from the ideal object's, each at
+    the depth that the instrument reads.
+    """
+    motion = result.motion
+    turn, shift = _device(result)
+    read = (1e3 * result.recording.position - shift) @ turn
+    presses = [k for k, touch in enumerate(result.touches) if touch.kind == "press"]
+    presses.sort(key=lambda k: result.touches[k].depth)
+    shown = np.unique(np.linspace(0, len(presses) - 1, PRESSES_SHOWN).round().astype(int))
+    if result.ideal_n is not None:
+        change = np.linalg.norm(result.clean_n - result.ideal_n, axis=1)
+        shown = np.union1d(shown, np.argmax([change[motion.touch == k].max() for k in presses]))
+    for k in shown:
+        normal = result.touches[presses[k]].normal
+        rows = np.flatnonzero((motion.touch == presses[k]) & (motion.s > -1.0))
+        depth = motion.s[rows] + (motion.position[rows] - read[rows]) @ normal
+        ax.plot(depth, result.clean_n[rows] @ turn @ normal, color="#2c6fbb", lw=0.9)
+        if result.ideal_n is not None:
+            ideal = result.ideal_n[rows] @ turn @ normal
+            ax.plot(motion.s[rows], ideal, color="#7f8c8d", lw=1.0, ls="--")
+    ax.set(
+        xlabel="depth as read (ideal: true depth) [mm]",
+        ylabel="force along the normal [N]",
+        title=f"{len(shown)} of {len(presses)} presses",
+    )

@@ -1,0 +1,87 @@
+"""Find the nodule: hidden until the answer, scored by distance and time, one renderer against another.
+
+The clock runs from the first touch. A round's score is 100 for an answer on the spot in no time; it halves
+with every nodule's radius that the answer is off, seen from above, and with every minute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from palpate.mechanics.model.material import Ball
+
+HALF_TIME_S = 60.0
+
+
+@dataclass(frozen=True)
+class Answer:
+    """renderer: what was felt. off_m: beside the nodule's middle, seen along `up`. score: 0 to 100."""
+
+    renderer: str
+    off_m: float
+    seconds: float
+    score: float
+
+
+class Game:
+    """Rounds of one scene. hidden: its nodules, in the scene's frame. up: (3,) the support's normal."""
+
+    def __init__(self, hidden: Sequence[Ball], up: np.ndarray) -> None:
+        self.hidden = tuple(hidden)
+        self.answers: list[Answer] = []
+        self._up = np.asarray(up, dtype=float)
+        self._started_s: float | None = None
+        self._touching = False
+
+    @property
+    def answered(self) -> bool:
+        """Whether the nodule may be seen; the next touch, from the air, begins the next round."""
+        return bool(self.answers) and self._started_s is None
+
+    def follow(self, touching: bool, now_s: float) -> None:
+        """At every picture: a touch that begins starts the clock, where it does not run."""
+        if touching and not self._touching and self._started_s is None:
+            self._started_s = now_s
+        self._touching = touching
+
+    def seconds(self, now_s: float) -> float:
+        """Since this round's first touch."""
+        return 0.0 if self._started_s is None else now_s - self._started_s
+
+    def answer(self, point_m: np.ndarray, now_s: float, renderer: str) -> Answer | None:
+        """The nodule is under `point_m` (3,); None where nothing was touched in this round."""
+        if self._started_s is None:
+            return None
+        seconds, self._started_s = now_s - self._started_s, None
+        offs = [self._off(point_m, ball) for ball in self.hidden]
+        nearest = int(np.argmin(offs))
+        halvings = offs[nearest] / self.hidden[nearest].radius_m + seconds / HALF_TIME_S
+        self.answers.append(Answer(renderer, offs[nearest], seconds, 100.0 * 0.5**halvings))
+        return self.answers[-1]
+
+    def _off(self, point_m: np.ndarray, ball: Ball) -> float:
+        away = np.asarray(point_m) - ball.centre_m
+        return float(np.linalg.norm(away - (away @ self._up) * self._up))
+
+    def lines(self, now_s: float) -> list[str]:
+        """For the panel: what to do, the last round, and the mean score of each renderer."""
+        if self._started_s is not None:
+            first = f"A nodule is hidden: find it, then Enter. {self.seconds(now_s):.0f} s"
+        elif self.answers:
+            last = self.answers[-1]
+            first = (
+                f"{1000 * last.off_m:.1f} mm beside the nodule after {last.seconds:.0f} s by "
+                f"{last.renderer}: {last.score:.0f} points. Touch anew to go on, Tab for another renderer."
+            )
+        else:
+            first = "A nodule is hidden: press to find where it resists more, then Enter."
+        names = sorted({a.renderer for a in self.answers})
+        scores = [
+            f"{name} {np.mean([a.score for a in self.answers if a.renderer == name]):.0f} points in "
+            f"{sum(a.renderer == name for a in self.answers)}"
+            for name in names
+        ]
+        return [first, *([", ".join(scores)] if len(names) > 1 else [])]

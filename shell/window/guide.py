@@ -1,0 +1,159 @@
+"""Guidance in the touch window: the servo's ticks are cut into segments, a ghost tip shows the suggestion.
+
+The person does as he likes: what was done counts. A segment ends where the tip has been in the air for a
+while; it is taken in by the session's worker, so that the picture never waits, and the recording so far is
+written after it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from palpate.diagnosis.explore.explorer import Explorer, State, Suggestion
+from palpate.diagnosis.explore.segments import Segment
+from palpate.mechanics.model.model import Model
+from palpate.servo import Servo
+from palpate.window.ghost import Ghost
+from palpate.window.tracing import BaseTracing
+from palpate.window.worker import Worker
+
+TOUCHING_N = 0.02
+"""Force from which the tip touches something."""
+AIR_S = 0.3
+"""In the air for so long, a segment has ended."""
+LEAST_S = 0.05
+"""A shorter contact is a brush."""
+WAVED_S = 3.0
+"""So long in the air, where it was asked for, is waving."""
+ON_IT = 1.2
+"""Tip radii above the support, a tip's centre is on it."""
+WHAT = {
+    "stop": "done",
+    "trace": "slide around the foot",
+    "rigid": "press the bare support",
+    "free": "wave in the air",
+    "retrace": "slide around the foot once more",
+}
+"""What to do, by kind of suggestion; a press has its depth."""
+
+
+class Guide:
+    """Call `follow` at every frame; read `ghost` and `lines`.
+
+    model: what is felt; of it only how far its foot has been gone round is read, and where the support is.
+    """
+
+    def __init__(
+        self, explorer: Explorer, servo: Servo, model: Model, worker: Worker, path: str | Path
+    ) -> None:
+        self.explorer = explorer
+        self._servo, self._worker, self._path = servo, worker, path
+        self._model, self._support = model, model.support
+        self._tracing = BaseTracing(model)
+        self._next = int(servo.arrays.ring_head[0])
+        self._rows: list[np.ndarray] = []
+        self._first: int | None = None
+        self._last_touch: int | None = None
+        self._suggestion: Suggestion = explorer.suggest()
+        self._state: State = explorer.state
+
+    @property
+    def suggestion(self) -> Suggestion:
+        """What to do next, by all that was taken in."""
+        return self._suggestion
+
+    @property
+    def state(self) -> State:
+        """What is known, by all that was taken in."""
+        return self._state
+
+    @property
+    def ghost(self) -> Ghost | None:
+        """The press that is suggested; None where it is something else, or where one is being thought of."""
+        s = self._suggestion
+        if s.kind != "press" or s.point is None or s.normal is None:
+            return None
+        return Ghost(s.point + self._servo.tip_radius_m * s.normal, -s.normal, s.depth_m)
+
+    def follow(self) -> None:
+        """Take over the servo's newest ticks; hand a segment over where one has ended."""
+        rows, self._next = self._servo.history(self._next)
+        rows = rows[np.isfinite(rows["tip"]).all(axis=1)]
+        if not len(rows):
+            return
+        self._rows.append(rows)
+        self._tracing.add(rows["tip"], rows["tick"])
+        touching = np.flatnonzero(np.linalg.norm(rows["rendered"], axis=1) > TOUCHING_N)
+        if len(touching):
+            self._first = int(rows["tick"][touching[0]]) if self._first is None else self._first
+            self._last_touch = int(rows["tick"][touching[-1]])
+        rate = self._servo.options.rate_hz
+        if self._suggestion.kind == "free" and self._first is None:
+            if sum(map(len, self._rows)) > WAVED_S * rate:
+                self._take_in()
+            return
+        if self._first is None or self._last_touch is None:
+            return
+        if (int(rows["tick"][-1]) - self._last_touch) < AIR_S * rate:
+            return
+        lasted = (self._last_touch - self._first) / rate
+        self._first = self._last_touch = None
+        if self._still_tracing and not self._tracing.done:
+            return
+        if self._still_tracing or lasted >= LEAST_S:
+            self._take_in()
+
+    @property
+    def _still_tracing(self) -> bool:
+        """Whether the base was not all gone round yet, or not so that it was understood."""
+        return self._suggestion.kind in ("trace", "retrace")
+
+    def _take_in(self) -> None:
+        rows, self._rows = np.concatenate(self._rows), []
+        self._worker.run("thinking of the next touch", lambda: self._think(rows))
+
+    def _think(self, rows: np.ndarray) -> None:
+        """Take samples in, as what was asked for once all before them were taken in."""
+        segment = Segment(
+            self._kind(rows),
+            rows["tick"] * self._servo.options.period_ns * 1e-9,
+            rows["tip"],
+            rows["rendered"],
+            rows["quaternion"],
+        )
+        self.explorer.segments.append(segment)
+        self.explorer.bring_up_to_date()
+        self.explorer.save(self._path)
+        self._state, self._suggestion = self.explorer.state, self.explorer.suggest()
+        if self._suggestion.kind == "retrace":
+            self._tracing = BaseTracing(self._model)
+
+    def _kind(self, rows: np.ndarray) -> str:
+        asked = self._suggestion.kind
+        touched = np.linalg.norm(rows["rendered"], axis=1) > TOUCHING_N
+        height = self._support.height(rows["tip"][touched])
+        if asked == "rigid" and height.size and height.max() < ON_IT * self._servo.tip_radius_m:
+            return asked
+        if asked == "free" and not touched.any():
+            return asked
+        return asked if self._still_tracing else "press"
+
+    def lines(self) -> list[str]:
+        """For the panel: what to do, and what is known."""
+        s, state = self._suggestion, self._state
+        why = state.trouble.split(" (")[0].split(":")[0]
+        known = f"no shape yet: {why}" if why else "nothing is known yet"
+        if state.surface:
+            low, high = state.modulus_ci95_pa
+            known = (
+                f"{state.made} presses: {state.modulus_pa / 1e3:.1f} kPa ({low / 1e3:.1f} to "
+                f"{high / 1e3:.1f}), surface within {1e3 * state.surface_error_m:.1f} mm"
+            )
+        what = WHAT.get(s.kind, "")
+        if self._still_tracing:
+            what += f" ({100 * self._tracing.share:.0f} % traced)"
+        if s.kind == "press":
+            what = f"press at the ghost, {1e3 * s.depth_m:.0f} mm deep"
+        return [f"{what}: {s.why}", known]

@@ -1,0 +1,231 @@
+"""What stands beside the pictures: force, what to do next, buttons; settings; help."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from palpate.render.registry import names
+from palpate.scenes.scene import Scene
+from palpate.window.frames import Frame
+from palpate.window.keys import KEYS, help_rows, shown
+from palpate.window.mouse_and_keys import Controlled, Controls
+from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
+from palpate.window.session import FRICTIONS, MODULUS_STEP
+from palpate.window.widgets import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
+
+T = TypeVar("T")
+WARNING = "#b3261e"
+DRAGGED_M = 0.006
+DEPTH = "press depth"
+"""The slider's name."""
+
+
+class Shown(Controlled, Protocol):
+    """What stands beside the pictures of a window is read off it."""
+
+    scene: Scene
+    controls: Controls
+    aside: str
+    coloured: bool
+    moved_by_mouse: bool
+
+    def next_words(self, frame: Frame) -> str:
+        """What to do next."""
+
+
+class NextStep:
+    """What a newcomer does next: each step is said until it was done, in this order."""
+
+    def __init__(self, window: Shown, *, mouse: bool) -> None:
+        pointer, session, orbit = window.pointer, window.session, window.orbit
+        depth, look = pointer.press_depth_m, orbit.azimuth
+        self._began: np.ndarray | None = None
+        self._can_stop = session.has_force
+
+        def touching(frame: Frame) -> bool:
+            return frame.touching
+
+        steps: list[tuple[str, Callable[[Frame], bool]]] = [
+            ("Move the mouse over the object.", lambda _: pointer.target is not None),
+            ("Hold the left button: the tip presses in.", touching),
+            ("Hold it, and turn the wheel: deeper, or less deep.", lambda _: pointer.press_depth_m != depth),
+            ("Hold it, and drag: the tip sticks, then slides.", self._dragged),
+            ("Hold the right button and move: the view turns.", lambda _: orbit.azimuth != look),
+        ]
+        if not mouse:
+            steps = [("Move the device until the tip touches.", touching)]
+        if not session.beside_name:
+            both = "Side by side: feel one renderer, see another."
+            steps.append((both, lambda _: bool(session.beside_name)))
+        if window.game is None:
+            ball = "Stiff ball puts one under the tip: press there again."
+            steps.append((ball, lambda _: session.inclusion is not None))
+        self._steps = steps
+
+    def _dragged(self, frame: Frame) -> bool:
+        self._began = None if not frame.touching else frame.tip_m if self._began is None else self._began
+        return self._began is not None and float(np.linalg.norm(frame.tip_m - self._began)) > DRAGGED_M
+
+    def line(self, frame: Frame) -> str:
+        """For the panel."""
+        self._steps = [(words, done) for words, done in self._steps if not done(frame)]
+        if self._can_stop and not frame.force_enabled:
+            return "The force is off: Space, or Force, switches it on."
+        return self._steps[0][0] if self._steps else "Press anywhere. Settings changes what you feel."
+
+
+def main_rows(window: Shown, frame: Frame) -> list[Row]:
+    """The column on the left."""
+    session = window.session
+    felt, *others = frame.views
+    inside = [f"{session.young_modulus_pa / 1000:.1f} kPa", friction_words(session.friction)]
+    about = f"felt: {felt.name}"
+    if session.feels_inside:
+        about = ", ".join([about, *inside])
+    rows: list[Row] = [
+        (Item(window.scene.title, size=16, bold=True),),
+        (Item(about, size=12, colour=GREY),),
+        (Item(f"{np.linalg.norm(felt.force_n):.2f} N", size=46, bold=True, colour=ACCENT),),
+    ]
+    # its row is there without it too: no button moves away from under the mouse
+    second = "".join(f"{np.linalg.norm(v.force_n):.2f} N  {v.name}" for v in others)
+    rows.append((Item(second, size=17, bold=True, colour=SECOND),))
+    rows += [
+        (Item(_where(frame), size=12, colour=GREY),),
+        (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=2),),
+    ]
+    if window.moved_by_mouse:
+        rows += depth_rows(window)
+    return [*rows, *_buttons(window), *_status(window, frame)]
+
+
+def _where(frame: Frame) -> str:
+    if frame.touching:
+        return f"{1000 * frame.depth_m:.1f} mm deep, {frame.stiffness_n_per_m:.0f} N/m here"
+    return "on the support" if any(np.linalg.norm(v.force_n) > 0.0 for v in frame.views) else "in air"
+
+
+def depth_rows(window: Shown) -> list[Row]:
+    """How deep a press goes at most."""
+    pointer = window.pointer
+    low, high = 1e3 * LEAST_PRESS_M, 1e3 * MOST_PRESS_M
+    depth = 1e3 * pointer.press_depth_m
+
+    def slide(share: float) -> None:
+        pointer.go_deep(low + share * (high - low))
+
+    return [
+        (Item(f"A press goes {depth:.1f} mm deep", size=12),),
+        (Item(DEPTH, share=(depth - low) / (high - low), slide=slide),),
+    ]
+
+
+def _buttons(window: Shown) -> list[Row]:
+    session, offered = window.session, window.controls.offered
+    chosen = {
+        "b": bool(session.beside_name),
+        "c": window.coloured,
+        "i": session.inclusion is not None,
+        "r": session.recording is not None,
+        "s": window.aside == "s",
+        "h": window.aside == "h",
+    }
+    buttons = {
+        name: Item(
+            key.button,
+            do=partial(window.controls.do, name),
+            tip=f"{key.does} ({shown(name)})",
+            on=chosen.get(name, False),
+        )
+        for name, key in KEYS.items()
+        if key.button and name in offered
+    }
+    first = buttons.pop("Return", None)
+    return [*([(first,)] if first else []), *_grid(list(buttons.values()))]
+
+
+def _status(window: Shown, frame: Frame) -> list[Row]:
+    """What goes on besides."""
+    session, worker = window.session, window.session.worker
+    rows: list[Row] = []
+    if worker.busy:
+        rows.append((Item(f"{worker.busy[0].upper()}{worker.busy[1:]}", size=12),))
+        if worker.share > 0.0:
+            rows.append((Item("busy", share=worker.share),))
+    elif worker.failure:
+        rows.append((Item(worker.failure, size=12, colour=WARNING),))
+    if session.recording is not None:
+        traced = f"base traced {100 * session.recording.traced:.0f} %"
+        rows.append((Item(f"Recording {frame.recorded_s or 0.0:.0f} s, {traced}", size=12, colour=WARNING),))
+    return [*rows, *((Item(word, size=12, colour=GREY),) for word in (frame.reason, window.notice) if word)]
+
+
+def friction_words(friction: float) -> str:
+    """Of a coefficient."""
+    return "sticks" if math.isinf(friction) else f"friction {friction:g}"
+
+
+def _title(text: str) -> list[Row]:
+    """Over the rows that follow, a little apart from those before."""
+    return [(Item("", size=4),), (Item(text, bold=True, colour=GREY, size=BODY - 1),)]
+
+
+def _grid(items: Sequence[Item], columns: int = 2) -> list[Row]:
+    """Items side by side; the last row is filled with nothing."""
+    rows = [tuple(items[k : k + columns]) for k in range(0, len(items), columns)]
+    if rows and len(rows[-1]) < columns:
+        rows[-1] += tuple(Item("") for _ in range(columns - len(rows[-1])))
+    return rows
+
+
+def _choices(chosen: T, every: Sequence[tuple[str, T]], do: Callable[[T], object]) -> list[Item]:
+    """A button each; the one that holds now is marked."""
+    return [Item(words, do=partial(do, value), on=value == chosen, size=12) for words, value in every]
+
+
+def settings_rows(window: Shown) -> list[Row]:
+    """The column on the right: everything that may be changed about what is felt."""
+    session = window.session
+
+    renderers = [(name, name) for name in names()]
+    rows = [
+        *_title("What you feel"),
+        *_grid(_choices(session.renderer_name, renderers, session.set_renderer), 1),
+        *_title("Beside it"),
+        *_grid(_choices(session.beside_name, [("nothing", ""), *renderers], session.set_beside), 1),
+    ]
+    if session.feels_inside:
+        frictions = [("sticks" if math.isinf(mu) else f"{mu:g}", mu) for mu in FRICTIONS]
+        sticks, *slips = _choices(session.friction, frictions, session.set_friction)
+        modulus = f"{session.young_modulus_pa / 1000:.1f} kPa"
+        rows += [*_title("Friction"), (sticks,), tuple(slips)]
+        rows += [
+            *_title("Stiffness"),
+            (
+                Item("softer", do=lambda: session.scale_modulus(1.0 / MODULUS_STEP), size=12),
+                Item(modulus, do=session.reset_modulus, tip="As the model has it", size=12),
+                Item("stiffer", do=lambda: session.scale_modulus(MODULUS_STEP), size=12),
+            ),
+        ]
+    if session.model.effects:
+        on_off = [("on", True), ("off", False)]
+        rows += [
+            *_title(f"Effects: {', '.join(sorted(session.model.effects)).replace('_', ' ')}"),
+            tuple(_choices(session.effects, on_off, session.set_effects)),
+        ]
+    if window.moved_by_mouse:
+        rows += [*_title("Depth"), *depth_rows(window)]
+    return rows
+
+
+def aside_rows(window: Shown) -> list[Row]:
+    """What is open on the right."""
+    heading = Item("Settings" if window.aside == "s" else "Help", size=16, bold=True, wide=3.0)
+    close = Item("Close", do=lambda: window.show_aside(window.aside), size=12, wide=1.2)
+    rows = settings_rows(window) if window.aside == "s" else help_rows(window.controls.offered)
+    return [(heading, close), *rows]

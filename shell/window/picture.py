@@ -1,0 +1,224 @@
+"""One renderer's object on a plotter: the surface deforming under the tip, the force as an arrow."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import pyvista
+import scipy.sparse as sp
+
+from palpate.mechanics.frames import tangents
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.shape.tetmesh import vertex_normals
+from palpate.render.base import Renderer
+from palpate.render.press import BESIDE
+from palpate.render.support import support_plane
+from palpate.scenes.phantoms import Region
+from palpate.window import shadow
+from palpate.window.frames import Frame, View
+from palpate.window.lettering import set_type
+from palpate.window.pointer import Target
+from palpate.window.stiffness import DEPTH_M
+from palpate.window.widgets import INK
+
+ARROW_M_PER_N = 0.03
+LEAST_ARROW_N = 0.02
+SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
+DISPLACEMENT_RANGE_MM = (0.0, 6.0)
+STIFFNESS = f"secant stiffness at {1000 * DEPTH_M:.0f} mm (N/m)"
+SPREAD = 2
+TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
+
+Colours = Literal["viridis", "YlOrRd"]
+
+
+class ObjectPicture:
+    """Draws onto the subplot `place`; `update` moves what is there, nothing is added again."""
+
+    def __init__(
+        self,
+        plotter: pyvista.Plotter,
+        renderer: Renderer,
+        model: Model,
+        tip_radius_m: float,
+        *,
+        place: tuple[int, int] = (0, 0),
+        label: str = "",
+    ) -> None:
+        self._plotter = plotter
+        self._radius = tip_radius_m
+        self._place = place
+        plotter.subplot(*place)
+        points, triangles = renderer.surface
+        self._rest = np.array(points, dtype=float)
+        self._surface = pyvista.PolyData.from_regular_faces(self._rest.copy(), np.asarray(triangles))
+        self._surface["displacement (mm)"] = np.zeros(len(points))
+        self._moved = np.zeros_like(self._rest)
+        self._flat = vertex_normals(self._rest, np.asarray(triangles))
+        felt = renderer.contact.arrays
+        self._smooth = _spread(felt.normals, felt.triangles[felt.free > 0])
+        self._shade()
+        self._actor: pyvista.Actor | None = None
+        self._bar = ""
+        self._title = label
+        _add_support(plotter, model, self._rest)
+        self._tip = plotter.add_mesh(
+            pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
+            smooth_shading=True,
+            color=TIP_COLOUR,
+            ambient=0.35,
+            specular=0.4,
+        )
+        self._arrow = plotter.add_mesh(
+            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR, ambient=0.6
+        )
+        self._ball = plotter.add_mesh(
+            pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20),
+            smooth_shading=True,
+            color=INCLUSION_COLOUR,
+        )
+        self._ball.SetVisibility(False)
+        self._inside: Region | None = None
+        self._arrow.SetVisibility(False)
+        blot = shadow.blot(SHADOW_IN_RADII * tip_radius_m)
+        self._shadow = plotter.add_mesh(
+            blot, scalars="shade", rgba=True, lighting=False, show_scalar_bar=False
+        )
+        self._shadow.SetVisibility(False)
+        self.colour_by_displacement()
+
+    @property
+    def rest_surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n, 3) m and triangles (k, 3) of the undeformed surface."""
+        return self._rest, self._surface.regular_faces
+
+    def colour_by_displacement(self) -> None:
+        """As far as each point has moved, mm."""
+        self._colour_by("displacement (mm)", "YlOrRd", DISPLACEMENT_RANGE_MM)
+
+    def colour_by_stiffness(self, stiffness_n_per_m: np.ndarray, limits: tuple[float, float]) -> None:
+        """(n,) N/m a point, 0 where it cannot be pressed: the secant of a press; limits: of the colours."""
+        name = STIFFNESS
+        self._surface[name] = stiffness_n_per_m
+        self._colour_by(name, "viridis", limits)
+
+    def _colour_by(self, name: str, colours: Colours, limits: tuple[float, float]) -> None:
+        self._plotter.subplot(*self._place)
+        opacity, culling = 1.0, "none"
+        if self._actor is not None:
+            opacity, culling = self._actor.prop.opacity, self._actor.prop.culling
+            self._plotter.remove_actor(self._actor, render=False)
+            self._plotter.scalar_bars.remove_scalar_bar(self._bar, render=False)
+        self._bar = f"{name}{self._title}"
+        self._actor = self._plotter.add_mesh(
+            self._surface,
+            scalars=name,
+            cmap=colours,
+            clim=limits,
+            opacity=opacity,
+            ambient=0.3,
+            diffuse=0.62,
+            scalar_bar_args={
+                "title": self._bar,
+                "n_labels": 2,  # a third would lie under the title
+                "fmt": "%.0f",
+                "width": 0.42,
+                "height": 0.06,
+                "position_x": 0.56,
+                "position_y": 0.02,
+                "unconstrained_font_size": True,
+            },
+            render=False,
+        )
+        bar = self._plotter.scalar_bars[self._bar]
+        for words in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
+            set_type(words, 11, False, INK)
+        self._actor.prop.interpolation, self._actor.prop.culling = "Gouraud", culling
+
+    def _shade(self) -> None:
+        """As the tip feels it: by the contact normals, turned as the surface has turned since."""
+        now = vertex_normals(np.asarray(self._surface.points), self._surface.regular_faces)
+        self._surface.point_data["normals"] = self._smooth + now - self._flat
+        self._surface.point_data.active_normals_name = "normals"
+
+    def _see_through(self, on: bool) -> None:
+        if self._actor is not None:
+            self._actor.prop.opacity = 0.45 if on else 1.0
+            # what is seen through is its front alone, whatever the order of its triangles
+            self._actor.prop.culling = "back" if on else "none"
+
+    def show_inclusion(self, region: Region | None) -> None:
+        """A ball where the inclusion is, seen through the object, or nothing."""
+        if region == self._inside:
+            return
+        self._inside = region
+        self._ball.SetVisibility(region is not None)
+        self._see_through(region is not None)
+        if region is not None:
+            self._ball.SetPosition(*region.centre_m)
+            self._ball.SetScale(region.radius_m)
+
+    def update(self, frame: Frame, view: View, below: Target | None = None) -> None:
+        """Move surface, tip and arrow to a frame; below: what the tip's shadow falls on."""
+        moved = view.displacement_m
+        if len(moved) == len(self._rest) and not np.array_equal(moved, self._moved):
+            self._moved = moved
+            self._surface.points = self._rest + moved
+            self._shade()
+            self._surface["displacement (mm)"] = 1000.0 * np.linalg.norm(moved, axis=1)
+        self._tip.SetPosition(*frame.tip_m)
+        self._shadow.SetVisibility(below is not None)
+        if below is not None:
+            height = float(np.linalg.norm(frame.tip_m - below.point))
+            self._shadow.prop.opacity = float(np.clip(1.0 - height / SHADOW_FADES_M, 0.2, 1.0))
+            self._shadow.SetUserMatrix(_placed(below.point + SHADOW_OFF_M * below.normal, below.normal))
+        force = view.force_n
+        size = float(np.linalg.norm(force))
+        self._arrow.SetVisibility(size > LEAST_ARROW_N)
+        if size > LEAST_ARROW_N:
+            start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
+            self._arrow.SetUserMatrix(arrow_matrix(start, force, ARROW_M_PER_N * size))
+
+
+def _spread(normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(v, 3) normals, each twice over the mean of its own and its neighbours' by these triangles: a narrow
+    rim turns over several of them, not in one, and shows none."""
+    v = len(normals)
+    i, j = triangles[:, [0, 1, 2, 1, 2, 0]].ravel(), triangles[:, [1, 2, 0, 0, 1, 2]].ravel()
+    near = sp.csr_matrix((np.ones(len(i)), (i, j)), shape=(v, v)) + sp.eye(v)
+    for _ in range(SPREAD):
+        normals = near @ normals
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals
+
+
+def _placed(point: np.ndarray, normal: np.ndarray) -> object:
+    """A matrix that takes the plane z = 0 to a point, across a unit normal."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.column_stack([*tangents(normal), normal])
+    matrix[:3, 3] = point
+    return pyvista.vtkmatrix_from_array(matrix)
+
+
+def arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> object:
+    """A matrix that takes the unit arrow along x to `start`, along `direction`."""
+    x = direction / np.linalg.norm(direction)
+    y = np.cross([0.0, 0.0, 1.0] if abs(x[2]) < 0.9 else [1.0, 0.0, 0.0], x)
+    y /= np.linalg.norm(y)
+    matrix = np.eye(4)
+    matrix[:3, :3] = length * np.column_stack([x, y, np.cross(x, y)])
+    matrix[:3, 3] = start
+    return pyvista.vtkmatrix_from_array(matrix)
+
+
+def _add_support(plotter: pyvista.Plotter, model: Model, points: np.ndarray) -> None:
+    size = 1.2 * BESIDE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    support = support_plane(model)
+    middle = model.mesh.points[model.mesh.fixed].mean(axis=0)
+    middle = middle - ((middle - support.point) @ support.normal) * support.normal
+    disc = shadow.floor(middle, support.normal, size, points)
+    # never seen from below: the eye stays over it
+    plotter.add_mesh(
+        disc, scalars="shade", rgb=True, lighting=False, culling="back", interpolate_before_map=False
+    )

@@ -1,0 +1,78 @@
+"""Soft shadows that cost nothing while a person touches: the floor's is worked out once, the tip's is a
+disc."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyvista
+from scipy.spatial import ConvexHull, QhullError
+
+from palpate.mechanics.frames import tangents
+
+FLOOR_COLOUR = np.array([217, 222, 229], dtype=float)
+DARKEST = 0.5
+_DIRECTIONS, _ANGLES, _NEAR_RINGS, _FAR_RINGS = 96, 72, 28, 12
+
+
+def floor(middle: np.ndarray, up: np.ndarray, radius_m: float, points: np.ndarray) -> pyvista.PolyData:
+    """A disc of the support about `middle` (3,) m, seen from above; point data "shade": RGB, darker where an
+    object of these points (n, 3) m takes the sky away."""
+    across, along = tangents(up)
+    foot = float(np.linalg.norm((points - middle) @ np.column_stack([across, along]), axis=1).max())
+    # close rings where the foot's shadow falls, ever wider ones outside
+    near = 1.6 * foot
+    far = np.geomspace(near, max(radius_m, 1.1 * near), _FAR_RINGS)[1:]
+    rings = np.concatenate([np.linspace(0.0, near, _NEAR_RINGS), far])
+    disc = _disc(middle, across, along, rings)
+    shade = 1.0 - DARKEST * occlusion(disc.points, points, up)
+    disc.point_data["shade"] = (shade[:, None] * FLOOR_COLOUR).astype(np.uint8)
+    return disc
+
+
+def occlusion(places: np.ndarray, points: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """(k,) share of an even sky's light that an object (n, 3) takes from places (k, 3) of a plane below it.
+
+    The object is taken for its convex hull; directions are spread by the cosine law.
+    """
+    across, along = tangents(up)
+    hull = points[ConvexHull(points).vertices]
+    k = np.arange(_DIRECTIONS) + 0.5
+    flat, turn = np.sqrt(k / _DIRECTIONS), np.pi * (1 + np.sqrt(5)) * k
+    steep = np.sqrt(1 - flat**2)
+    height = (hull - places[0]) @ up
+    found = np.zeros(len(places))
+    seen = (places - places[0]) @ np.column_stack([across, along])
+    for slope, angle in zip(flat / steep, turn, strict=True):
+        # where the sun's ray through each corner meets the plane
+        cast = (hull - places[0]) @ np.column_stack([across, along])
+        cast = cast - height[:, None] * slope * np.array([np.cos(angle), np.sin(angle)])
+        try:
+            sides = ConvexHull(cast).equations
+        except QhullError:
+            continue
+        found += (seen @ sides[:, :2].T + sides[:, 2] <= 0).all(axis=1)
+    return found / _DIRECTIONS
+
+
+def blot(radius_m: float) -> pyvista.PolyData:
+    """A disc in the plane z = 0 that fades outwards; point data "shade": RGBA."""
+    rings = np.linspace(0.0, radius_m, 8)
+    disc = _disc(np.zeros(3), np.eye(3)[0], np.eye(3)[1], rings)
+    fade = (1.0 - np.linalg.norm(disc.points, axis=1) / radius_m).clip(0.0, 1.0) ** 0.7
+    disc.point_data["shade"] = np.column_stack([np.zeros((len(fade), 3)), 150 * fade]).astype(np.uint8)
+    return disc
+
+
+def _disc(middle: np.ndarray, across: np.ndarray, along: np.ndarray, rings: np.ndarray) -> pyvista.PolyData:
+    angle = np.linspace(0.0, 2 * np.pi, _ANGLES, endpoint=False)
+    level = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * along
+    points = middle + rings[:, None, None] * level
+    i, j = np.arange(_ANGLES), (np.arange(_ANGLES) + 1) % _ANGLES
+    faces = []
+    for ring in range(len(rings) - 1):
+        a, b = ring * _ANGLES, (ring + 1) * _ANGLES
+        faces += [np.column_stack([a + i, b + i, b + j]), np.column_stack([a + i, b + j, a + j])]
+    triangles: Any = np.vstack(faces)
+    return pyvista.PolyData.from_regular_faces(points.reshape(-1, 3), triangles)

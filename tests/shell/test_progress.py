@@ -1,0 +1,90 @@
+"""Every wait says its stage and what is left of it, on standard error alone."""
+
+from __future__ import annotations
+
+import io
+import sys
+import time
+
+import pytest
+
+from palpate import output
+from palpate.mechanics.progress import Remaining
+from palpate.output import progress_bar
+from palpate.parallel.engine import run_with_bar
+from palpate.parallel.graph import Graph
+
+from ..support.waiting import eventually
+
+
+class Terminal(io.StringIO):
+    """Standard error that says it is one."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def until(said, wanted: str) -> str:
+    """What was said, once the words are there."""
+    eventually(lambda: wanted in said())
+    return said()
+
+
+@pytest.mark.parametrize(
+    ("done", "after_s", "words"),
+    [
+        (0.5, 60.0, "about 60 s left"),
+        (0.1, 60.0, "about 9 min left"),
+        (0.01, 360.0, "about 9.9 h left"),
+        (0.99, 60.0, "some seconds left"),
+        (0.0, 60.0, ""),
+    ],
+)
+def test_what_is_left_goes_by_the_pace_so_far(done, after_s, words):
+    now = iter([100.0, *[100.0 + after_s] * 9])
+    left = Remaining(lambda: next(now))
+    left.tell(0.0)
+    left.tell(done)
+    assert left.words() == words
+
+
+def test_what_was_done_before_does_not_count():
+    """A wait that begins at 60 %, since a model is there already, is no quick one."""
+    now = iter([0.0, *[30.0] * 9])
+    left = Remaining(lambda: next(now))
+    left.tell(0.6)
+    left.tell(0.7)
+    assert left.words() == "about 2 min left"
+
+
+def test_without_a_terminal_nothing_is_said(capfd, monkeypatch):
+    monkeypatch.setattr(output, "_SHORT_S", 0.0)
+    with progress_bar("compare") as tell:
+        tell("fold 1 of 8", 0.5)
+        time.sleep(0.3)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_terminal_shows_stage_share_and_what_is_left(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(output, "_SHORT_S", 0.0)
+    monkeypatch.setattr(output, "_REDRAWN_S", 0.05)
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress_bar("diagnose") as tell:
+        tell("effect 1: friction_slip", 0.5)
+        text = until(terminal.getvalue, "left")
+    assert "50%" in text and "diagnose: effect 1: friction_slip" in text and "left" in text
+
+
+def test_a_batch_says_what_is_left_by_the_same_display(monkeypatch, tmp_path):
+    shown: list[tuple[str, bool]] = []
+
+    class Seen(output.Bar):
+        def __init__(self, label: str, left: bool = True) -> None:
+            shown.append((label, left))
+            super().__init__(label, left)
+
+    monkeypatch.setattr(output, "Bar", Seen)
+    run_with_bar(Graph(()), tmp_path, workers=1)
+    assert shown == [("", False)]

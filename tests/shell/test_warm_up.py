@@ -1,0 +1,56 @@
+"""Kernels are compiled once, in two processes at once, and the demo says what can be done meanwhile."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from palpate import cli, warm_up
+from palpate.mechanics.errors import ContactError
+from palpate.operations.demo import MEANWHILE
+
+
+class Started:
+    """A process that only remembers which stages it was to compile."""
+
+    all: list[tuple[str, ...]] = []
+    stdin = None
+
+    def __init__(self, command: list[str], **_: object) -> None:
+        Started.all.append(tuple(command[command.index("palpate.warm_up") + 1 :]))
+
+    def wait(self) -> int:
+        return 0
+
+    def poll(self) -> int:
+        return 0
+
+
+def test_stages_that_are_compiled_are_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(warm_up, "choose_folder", lambda: tmp_path)
+    monkeypatch.setattr(warm_up.subprocess, "Popen", Started)
+    monkeypatch.setattr(Started, "all", [])
+    for left in ((), *[tuple(stages) for stages in warm_up.BESIDE_ONE_ANOTHER]):
+        for name in left:
+            mark = warm_up.mark_of(name)
+            assert mark is not None
+            mark.touch()
+        with warm_up.warming_up() as compiling:
+            compiling()
+    first, second = warm_up.BESIDE_ONE_ANOTHER
+    assert Started.all == [first, second, second]
+
+
+def test_the_demo_says_that_its_object_can_be_touched_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def ends(*_: object) -> None:
+        raise ContactError("that is all")
+
+    monkeypatch.setattr("palpate.operations.demo.run_demo", ends)
+    for terminal in (True, False):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda there=terminal: there)
+        assert cli.main(["demo", "-o", str(tmp_path / "demo")]) == 2
+        assert (MEANWHILE in capsys.readouterr().err) == terminal

@@ -1,0 +1,185 @@
+"""`palpate touch` without a window, its words where it cannot, and with a real window on a virtual screen."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.cli import main
+from palpate.mechanics.model.model import Model
+from palpate.mechanics.recording.recording import read_recording
+from palpate.window.tracing import BaseTracing
+
+from ...support.waiting import PATIENCE_S, eventually
+
+
+def test_headless_session_with_a_recording(
+    block: Model, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    path = tmp_path / "session.csv.gz"
+    words = ["touch", str(block.path), "--headless", "--seconds", "4", "--record", str(path), "--json", "-"]
+    assert main([*words, "--jump", "0.01"]) == 0
+    out, err = capsys.readouterr()
+    result = json.loads(out)
+    loosened = "protection loosened: --jump is 0.01 (default 0.005)"
+    assert loosened in err and loosened in result["servo"]["words"]
+    servo = result["servo"]
+    assert result["device"] == "simulated" and servo["ticks"] > 0
+    # of the four seconds' deadlines a busy machine misses some, and counts them
+    assert servo["ticks"] + servo["missed_ticks"] > 1000
+    recording = read_recording(path)
+    assert recording.truth["protection_loosened"] == [loosened]
+    assert recording.t[-1] > 2.0 and recording.object_name == block.path.name
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--headless", "--device", "mouse"], "drop --headless"),
+        (["--headless", "--device", "glove"], "allowed are mouse"),
+        (["--headless", "--renderer", "magic"], "allowed are fem"),
+        (["--headless", "--seconds", "-1"], "greater than 0"),
+        (["--headless", "--device", "replay"], "--replay REC"),
+        (["--headless", "--device", "spacemouse"], "plug"),
+    ],
+)
+def test_what_cannot_be_says_why(
+    block: Model, words: list[str], says: str, capsys: pytest.CaptureFixture
+) -> None:
+    assert main(["touch", str(block.path), *words]) == 2
+    error = capsys.readouterr().err.strip()
+    assert says in error and "\n" not in error
+
+
+def test_no_screen_is_said(
+    block: Model, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    if not sys.platform.startswith("linux"):
+        pytest.skip("only Linux can be without a screen")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert main(["touch", str(block.path)]) == 2
+    assert "--headless" in capsys.readouterr().err
+
+
+def test_tracing_counts_the_way_around(block: Model) -> None:
+    tracing = BaseTracing(block)
+    angle = np.linspace(0, np.pi, 200)
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
+    along *= 0.045 / np.abs(along).max(axis=1)[:, None]  # around the square foot, a tip's radius off it
+    half = np.column_stack([along, np.full(200, 0.0048)])
+    ticks = np.arange(200)
+    tracing.add(half, ticks)
+    assert tracing.share == pytest.approx(0.5, abs=0.03) and not tracing.done
+    tracing.add(half * [-1, -1, 2], 200 + ticks)  # above the support: does not count
+    tracing.add(half * [-1.2, -1.2, 1], 400 + ticks)  # away from the foot: does not count either
+    assert tracing.share == pytest.approx(0.5, abs=0.03) and tracing.last == 199
+    tracing.add(half * [-1, -1, 1], 600 + ticks)
+    assert tracing.done and (tracing.first, tracing.last) == (0, 799)
+    tracing.add(half, 800 + ticks)
+    assert tracing.last == 799, "what comes after the way around is palpation"
+
+
+@pytest.fixture
+def screen() -> Iterator[str]:
+    """A virtual screen; skipped where Xvfb or xdotool is missing."""
+    if not (shutil.which("Xvfb") and shutil.which("xdotool")):
+        pytest.skip("needs Xvfb and xdotool")
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1300x850x24"],
+        pass_fds=(write,),
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    with os.fdopen(read) as pipe:
+        display = f":{pipe.readline().strip()}"
+    yield display
+    server.terminate()
+    server.wait()
+
+
+@pytest.mark.slow
+def test_a_person_with_only_a_mouse(block: Model, screen: str, tmp_path: Path) -> None:
+    """A real window, a real pointer: hover, press, drag, keys; the recording holds what the hand did."""
+    path, picture = tmp_path / "mouse.csv.gz", tmp_path / "window.png"
+    environment = {**os.environ, "DISPLAY": screen}
+    environment.pop("WAYLAND_DISPLAY", None)
+    command = [sys.executable, "-m", "palpate.cli", "touch", str(block.path), "--beside", "hunt-crossley"]
+    command += ["--record", str(path), "--screenshot", str(picture)]
+    program = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+    def pointer(*words: str) -> str:
+        return subprocess.run(
+            ["xdotool", *words], env=environment, capture_output=True, text=True, check=False
+        ).stdout.strip()
+
+    found: list[str] = []
+
+    def stands() -> bool:
+        """The window is the same in five looks: it is made anew while it opens."""
+        time.sleep(1.0)
+        found[:] = [*found[-4:], pointer("search", "--name", ".- Palpate$")]
+        return len(found) == 5 and len(set(found)) == 1 and bool(found[0])
+
+    assert eventually(stands), "no window opened"
+    window = found[0].splitlines()[-1]
+    pointer("mousemove", "--window", window, "530", "280")
+    time.sleep(3.0)
+    for _ in range(4):
+        pointer("mousedown", "1")
+        time.sleep(4.0)
+        pointer("mouseup", "1")
+        time.sleep(2.0)
+    pointer("windowfocus", window)
+    pointer("key", "q")
+    words, _ = program.communicate(timeout=PATIENCE_S)
+    assert program.returncode == 0 and "N rendered" in words and "sent" not in words
+    force = np.linalg.norm(read_recording(path).force_on_tool, axis=1)
+    touching = force > 0.05
+    assert int((np.diff(touching.astype(int)) == 1).sum()) >= 2, "two presses were felt"
+    assert picture.stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_what_was_rendered_is_reconstructed(block: Model, tmp_path: Path) -> None:
+    """Base traced on the support, palpations, reconstruction: the modulus that was rendered, within 5 %."""
+    from palpate.reconstruction.pipeline import reconstruct
+
+    path = tmp_path / "session.csv.gz"
+    words = ["touch", str(block.path), "--headless", "--record", str(path), "--sites", "12", "--repeats", "1"]
+    assert main(words) == 0
+    recording = read_recording(path)
+    assert recording.base_model is None, "the base was traced, so nothing stands in for it"
+    model = reconstruct(recording)
+    assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--hand-mass", "0"], "--hand-mass"),
+        (["--stale", "1e9"], "--stale"),
+        (["--jump", "1e9"], "--jump"),
+        (["--slew", "1e300"], "--slew"),
+        (["--ramp", "1e-300"], "--ramp"),
+        (["--silence", "1e9"], "--silence"),
+        (["--support-damping=-1e6"], "--support-damping"),
+        (["--support-friction=-5"], "--support-friction"),
+    ],
+)
+def test_no_option_disarms_the_hand(
+    block: Model, words: list[str], says: str, capsys: pytest.CaptureFixture
+) -> None:
+    assert main(["touch", str(block.path), "--headless", "--seconds", "1", *words]) == 2
+    [error] = capsys.readouterr().err.strip().splitlines()
+    assert says in error and "allowed are numbers" in error
