@@ -29,8 +29,7 @@ from palpate.mechanics.disk.writing import atomic_file
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Tool
 from palpate.mechanics.progress import silent
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.render.options import BEST, RenderOptions
 from palpate.render.registry import create
 from palpate.render.replay import replay

@@ -27,9 +27,8 @@ from palpate.render.coupling import (
 )
 from palpate.render.passivity import PassivityOptions, passivity_parameters
 from palpate.render.scene import in_the_air
-from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views
+from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views, write_block
 from palpate.servo.loop import make_program, one_tick
-from palpate.servo.seqlock import write_block
 from palpate.servo.tick import (
     IN_CALIBRATED,
     IN_CONNECTED,

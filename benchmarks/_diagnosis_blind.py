@@ -166,7 +166,7 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
     from benchmarks._baselines import best_by_bic, regressed_gap
     from palpate.diagnosis.options import DiagnoseOptions
     from palpate.diagnosis.pipeline import diagnose
-    from palpate.diagnosis.verdict.corrections import factors
+    from palpate.diagnosis.verdict.conclusion import factors
     from palpate.mechanics.model.files import read_model
     from palpate.mechanics.recording.recording import read_recording
 

@@ -14,9 +14,9 @@ from palpate.diagnosis.explore.estimate import Estimate, updated
 from palpate.diagnosis.explore.explorer import Suggestion
 from palpate.diagnosis.explore.segments import join
 from palpate.diagnosis.explore.weighing import Weighing, weigh
-from palpate.diagnosis.search.detectable import SEEN
+from palpate.diagnosis.search.evidence import SEEN
 from palpate.mechanics.errors import SceneError
-from palpate.robot.laboratory import LaboratoryRobot
+from palpate.robot import LaboratoryRobot
 from palpate.scenes.laboratory.curves import ALONE
 from palpate.scenes.laboratory.presses import Touch
 from palpate.scenes.laboratory.session import SimulateOptions, Staging

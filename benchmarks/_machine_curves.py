@@ -12,7 +12,7 @@ from scipy.special import expit
 from palpate.mechanics.effects.power_law_relaxation import prony_terms
 from palpate.mechanics.effects.strain_stiffening import GREATEST, LEAST, hardening
 from palpate.mechanics.errors import RecordingError
-from palpate.reconstruction.machine_curves.compression import Compression
+from palpate.reconstruction.machine_curves.uniaxial import Compression
 
 
 @dataclass(frozen=True)

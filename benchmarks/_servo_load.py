@@ -20,7 +20,7 @@ from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.render.passivity import PassivityOptions, passivity_parameters
 from palpate.render.scene import in_the_air
-from palpate.servo.clock import c_function, compiled_now_ns, compiled_sleep_until
+from palpate.servo.clock import c_function, compiled_now_ns, compiled_sleep_until, real_time_thread
 from palpate.servo.histogram import BINS, Histogram, count
 from palpate.servo.layout import (
     DEADLINE,
@@ -30,10 +30,9 @@ from palpate.servo.layout import (
     SharedArrays,
     total_bytes,
     views,
+    write_block,
 )
 from palpate.servo.loop import Program, make_program, one_tick
-from palpate.servo.realtime import real_time_thread
-from palpate.servo.seqlock import write_block
 from palpate.servo.tick import (
     IN_POSITION,
     IN_SEQUENCE,

@@ -21,7 +21,7 @@ from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.cutting import FoundPresses, cut
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 MODULUS_PA, POISSON, RADIUS_M, NOISE_N, RATE_HZ = 20e3, 0.49, 0.005, 0.008, 500.0
 SIZE_M = (0.08, 0.08, 0.04)

@@ -16,8 +16,7 @@ from palpate.devices.impedance import HandImpedance
 from palpate.devices.virtual_hand import SPEC
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.render.base import Renderer
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.options import RenderOptions

@@ -10,7 +10,7 @@ import pyvista
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.shape.nearest import closest, sample
-from palpate.reconstruction.shapes.evidence import Evidence
+from palpate.reconstruction.shapes.fit import Evidence
 
 TIP_RADIUS_M = 0.005
 

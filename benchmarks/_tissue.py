@@ -18,8 +18,7 @@ from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.making import PathErrors, of_paths
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldSites
 
 NU, RATE_HZ, UP = 0.49, 200.0, np.array([0.0, 0.0, 1.0])

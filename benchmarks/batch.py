@@ -27,8 +27,7 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from palpate.batching.plan import Choice
-from palpate.batching.run import Batch, batch
+from palpate.batching.plan import Batch, Choice, batch
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.progress import Progress
 from palpate.mechanics.recording.files import recording_files

@@ -21,8 +21,7 @@ from benchmarks.timing import measure, table
 from palpate.mechanics.elastic.pardiso import Pardiso, available
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.parallel.worker import high_water_bytes
 
 

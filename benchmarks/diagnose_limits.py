@@ -90,10 +90,9 @@ def _limits(recording: Recording, model: Model) -> dict[str, float]:
     from palpate.diagnosis.forward.prediction import build_forward
     from palpate.diagnosis.forward.touches import touches_of
     from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
-    from palpate.diagnosis.search.detectable import detectable
-    from palpate.diagnosis.search.evidence import Search
+    from palpate.diagnosis.search.descent import misfit_of
+    from palpate.diagnosis.search.evidence import Search, detectable
     from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
-    from palpate.diagnosis.search.starts import misfit_of
     from palpate.mechanics.effects.base import Role
     from palpate.mechanics.effects.registry import effects
     from palpate.reconstruction.presses_on_model import presses_on

@@ -28,8 +28,8 @@ from palpate.mechanics.shape.nearest import sample
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.output import progress_bar
-from palpate.reconstruction.shapes.coarse_drawing import decimated
-from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.shapes.drawing import decimated
+from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, fill
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.surface.contact_surface import contact_surface

@@ -21,7 +21,7 @@ from benchmarks.timing import table
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.recording.recording import Recording, read_recording
 from palpate.reconstruction.pipeline import reconstruct_fully
-from palpate.reconstruction.steps.s4_surface.surface import SurfaceOptions, evidence_of, reconstruct_surface
+from palpate.reconstruction.steps.s4_surface import SurfaceOptions, evidence_of, reconstruct_surface
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.options import RenderOptions
 from palpate.render.replay import replay_error, replay_recording

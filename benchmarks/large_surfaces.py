@@ -26,10 +26,9 @@ from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.shape.box_mesh import box_mesh
 from palpate.mechanics.shape.nearest import closest
 from palpate.mechanics.shape.refine import refined_near_surface
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.render.fem.renderer import FemRenderer
 
 NU, MODULUS, RADIUS = 0.49, 20e3, 0.005

@@ -8,7 +8,7 @@ from typing import Any
 from benchmarks._recording import add_indentation, add_recording, recording_of, timed
 from palpate.mechanics.compliance.sites import touch_sites, touch_solver
 from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
-from palpate.reconstruction.steps.s6_one_d.one_d import profiles
+from palpate.reconstruction.steps.s6_one_d import profiles
 from palpate.reconstruction.steps.s7_modulus.modulus import fit_modulus
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperOptions, fit_paper_modulus
 

@@ -18,8 +18,8 @@ from palpate.mechanics.compliance.sites import patch_width
 from palpate.mechanics.compliance.surface_compliance import patch_blocks
 from palpate.mechanics.elastic.inclusion import Region
 from palpate.mechanics.elastic.solver import Solver
-from palpate.mechanics.model.moduli import inclusion_ratio, mixed_ratio, share_inside
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.model.material import inclusion_ratio, mixed_ratio, share_inside
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 NU = 0.49
 

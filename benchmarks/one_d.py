@@ -7,7 +7,7 @@ from typing import Any
 
 from benchmarks._recording import add_recording, recording_of, timed
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
-from palpate.reconstruction.steps.s6_one_d.one_d import fit_paper, fit_robust, profiles
+from palpate.reconstruction.steps.s6_one_d import fit_paper, fit_robust, profiles
 
 PAPER_S = 0.5
 

@@ -31,7 +31,7 @@ from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.side_of_play import play
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 MODULUS_PA, NU, TIP_M, RATE_HZ = 20e3, 0.49, 0.005, 500.0
 NOISE_N, TREMOR_M, TREMOR_HZ, STEP_M = 0.01, 25e-6, 9.0, 3e-5

@@ -18,8 +18,7 @@ from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.press_solver.press import PressOptions, PressSolver
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.scenes.phantoms import PHANTOMS, Phantom
 
 RADIUS_M, POISSON_RATIO = 5e-3, 0.49

@@ -31,8 +31,7 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.progress import silent
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.render.options import DOCUMENTED, SETTINGS, RenderOptions
 from palpate.render.registry import create, simulator_names
 from palpate.render.replay import replay
@@ -226,7 +225,7 @@ class _Recorded:
     @classmethod
     def of(cls, path: Path | None, folder: Path | None, most: int) -> _Recorded:
         """The embedded recording where there is no path; reconstructed where there is no model."""
-        from palpate.diagnosis.other_simulator.presses_to_run import spread_out
+        from palpate.diagnosis.other_simulator.forces import spread_out
         from palpate.mechanics.model.files import read_model
         from palpate.mechanics.recording.recording import read_recording
         from palpate.operations.reconstruct import reconstruct

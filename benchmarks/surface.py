@@ -19,7 +19,7 @@ from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.mechanics.shape.nearest import distance, sample
 from palpate.output import progress_bar
-from palpate.reconstruction.steps.s4_surface.surface import SURFACES, SurfaceOptions, reconstruct_surface
+from palpate.reconstruction.steps.s4_surface import SURFACES, SurfaceOptions, reconstruct_surface
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

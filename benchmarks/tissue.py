@@ -23,8 +23,7 @@ from benchmarks.timing import table
 from palpate.diagnosis.compare.models import HOMOGENEOUS, MODELS, RIVALS, predicted, prepare, rms
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.output import progress_bar
 from palpate.reconstruction.presses_on_model import presses_on
 

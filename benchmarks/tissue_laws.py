@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks._machine_curves import FORMS, Held, fit_elastomer, fit_holds, hold_error
 from benchmarks.timing import table
 from palpate.mechanics.errors import RecordingError
-from palpate.reconstruction.machine_curves.compression import Compression, read_compression
+from palpate.reconstruction.machine_curves.uniaxial import Compression, read_compression
 
 FROM_STRAIN = 0.02
 SILICONES, BEEF = "tissue_phantom_compression", "meat_indentation_relaxation"

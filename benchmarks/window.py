@@ -4,7 +4,7 @@ A mouse presses into the middle of the first picture while frames go by, off scr
 `tick` is everything but the drawing (state in, surface and shadow moved, words, plots), which a graphics card
 does not make faster: 1 over it is what a card could reach at most. The processor's own time stands beside the
 clock's, for machines that do something else as well. Then each part is drawn alone: where pictures are slow,
-the second one, words and plots come less often (palpate.window.pace).
+the second one, words and plots come less often (palpate.window.worker).
 """
 
 from __future__ import annotations

@@ -20,9 +20,9 @@ from palpate.diagnosis.instrument.retraced import move_of
 from palpate.diagnosis.instrument.support_readings import rigid_of
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from palpate.diagnosis.search.attribution import attribute
+from palpate.diagnosis.search.descent import misfit_of
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
-from palpate.diagnosis.search.starts import misfit_of
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.diagnosis.verdict.conclusion import conclude
 from palpate.diagnosis.verdict.result import Diagnosis

@@ -28,7 +28,7 @@ from palpate.mechanics.frames import tangents
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.making import of_paths
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 FOLDER = Path(__file__).resolve().parent / "images" / "effects"
 MODULUS_PA, NU, TIP_M, RATE_HZ = 20e3, 0.49, 0.005, 500.0

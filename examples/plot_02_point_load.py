@@ -14,7 +14,7 @@ import numpy as np
 from palpate.mechanics.compliance.sites import touch_sites, touch_solver
 from palpate.mechanics.contact.touch import touch_force
 from palpate.mechanics.elastic.solver import Solver
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 MODULUS, NU, RADIUS, DEPTH = 20e3, 0.49, 0.005, 0.005
 SIDE, HEIGHT = 0.06, 0.03

@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 from palpate.diagnosis.explore.explorer import Suggestion
-from palpate.robot.laboratory import LaboratoryRobot
+from palpate.robot import LaboratoryRobot
 from palpate.scenes.phantoms import phantom
 
 

@@ -6,7 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Self
 
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s5_mesh.meshing import Meshing, MeshingOptions, as_meshed, fill
 
 

@@ -24,15 +24,13 @@ from palpate.mechanics.press_solver.solved_places import (
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Clock, Progress, part
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.reconstruction.geometry.in_device_frame import Placed
-from palpate.reconstruction.geometry.stated import GeometryOptions
-from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions
-from palpate.reconstruction.steps.s2_base.boundary import BoundaryOptions
+from palpate.reconstruction.geometry.stated import GeometryOptions, Placed
+from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
+from palpate.reconstruction.steps.s2_base import BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions
-from palpate.reconstruction.steps.s4_surface.casting import CastPoints
-from palpate.reconstruction.steps.s4_surface.surface import Surface, SurfaceOptions
+from palpate.reconstruction.steps.s4_surface import CastPoints, Surface, SurfaceOptions
 from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, uncertainty_at
-from palpate.reconstruction.steps.s6_one_d.one_d import fit_paper, fit_robust
+from palpate.reconstruction.steps.s6_one_d import fit_paper, fit_robust
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
 from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus

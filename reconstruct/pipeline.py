@@ -23,29 +23,33 @@ from palpate.mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.recording.recording import Recording, base_model_of
 from palpate.mechanics.result import Result
 from palpate.reconstruction.background_mesher import BackgroundMesher
-from palpate.reconstruction.checks.finding import Finding
-from palpate.reconstruction.checks.outcome import outcome_of
+from palpate.reconstruction.checks.finding import Finding, outcome_of
 from palpate.reconstruction.checks.registry import Checkup
-from palpate.reconstruction.geometry.in_device_frame import Placed, nowhere
-from palpate.reconstruction.geometry.known_base import base_of_model
 from palpate.reconstruction.geometry.known_shape import place
-from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
+from palpate.reconstruction.geometry.stated import (
+    GeometryOptions,
+    Placed,
+    base_of_model,
+    nowhere,
+    stated_geometry,
+)
 from palpate.reconstruction.methods import BY_NAME, Body, Fitted, Method, Solved
 from palpate.reconstruction.methods import ReconstructOptions as ReconstructOptions
-from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
 from palpate.reconstruction.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points, is_points
 from palpate.reconstruction.steps.s3_contacts.straightened import laid
-from palpate.reconstruction.steps.s4_surface.casting import CastPoints, cast
-from palpate.reconstruction.steps.s4_surface.surface import (
+from palpate.reconstruction.steps.s4_surface import (
+    CastPoints,
     Surface,
+    cast,
     evidence_of,
     reconstruct_surface,
     shape_table,
 )
 from palpate.reconstruction.steps.s5_mesh.meshing import Meshing, uncertainty_at
-from palpate.reconstruction.steps.s6_one_d.one_d import OneD, columns, profiles
+from palpate.reconstruction.steps.s6_one_d import OneD, columns, profiles
 from palpate.reconstruction.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.reconstruction.steps.s7_modulus.modulus_field import with_fitted_field

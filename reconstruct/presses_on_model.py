@@ -8,15 +8,14 @@ from palpate.mechanics.errors import ContactError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
-from palpate.reconstruction.geometry.known_base import base_of_model
-from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
+from palpate.reconstruction.geometry.stated import GeometryOptions, base_of_model, stated_geometry
 from palpate.reconstruction.steps.s1_filter.signals import stated_tracing
-from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 from palpate.reconstruction.steps.s3_contacts.left_out import off_surface, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points, is_points
 from palpate.reconstruction.steps.s3_contacts.straightened import laid
-from palpate.reconstruction.steps.s4_surface.casting import cast
+from palpate.reconstruction.steps.s4_surface import cast
 
 _ANY = ContactOptions(least_palpations=1)
 _FAR = 3.0

@@ -12,7 +12,7 @@ stiffness K; every further tick of delay adds K |dx|^2. Three parts mend it:
 3. *Expiry*: nobody knows when the next tick comes. Every force goes out with the time for which it may act,
    the longest in which a hand of the least mass could not get more than is left; then the device lets go.
 
-What was given is no guess of the tick's: whoever holds the force books its work (palpate.servo.work_on_hand).
+What was given is no guess of the tick's: whoever holds the force books its work (the servo's device thread).
 
 Signs: forces on the tool, device frame; energy is positive where it went into the rendering. Pure step on
 preallocated arrays; it knows no clock.

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 RENDERERS = {
     "fem": "palpate.render.fem.renderer",
-    "kelvin-voigt": "palpate.render.one_d.renderer",
-    "hunt-crossley": "palpate.render.one_d.renderer",
-    "hunt-crossley-undamped": "palpate.render.one_d.renderer",
-    "hunt-crossley-kh": "palpate.render.one_d.renderer",
+    "kelvin-voigt": "palpate.render.one_d",
+    "hunt-crossley": "palpate.render.one_d",
+    "hunt-crossley-undamped": "palpate.render.one_d",
+    "hunt-crossley-kh": "palpate.render.one_d",
 }
 """Our own."""
 

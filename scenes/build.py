@@ -188,8 +188,8 @@ def _built(
 ) -> Model:
     """The model of a shape that stands in its own frame; own: its material where the scene says nothing."""
     # here, and below: a model that is kept or shipped is opened without loading what makes one
-    from palpate.reconstruction.shapes.coarse_drawing import decimated
-    from palpate.reconstruction.steps.s4_surface.surface import Surface
+    from palpate.reconstruction.shapes.drawing import decimated
+    from palpate.reconstruction.steps.s4_surface import Surface
     from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
 
     surface = Surface(

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from palpate.diagnosis.specimen.result import Material as Material
     from palpate.diagnosis.verdict.result import Diagnosis as Diagnosis
     from palpate.importing.imported import Imported as Imported
-    from palpate.importing.opened import Opened as Opened
+    from palpate.importing.kinds import Opened as Opened
     from palpate.mechanics.errors import CacheError as CacheError
     from palpate.mechanics.errors import ContactError as ContactError
     from palpate.mechanics.errors import DeviceError as DeviceError
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
     from palpate.operations.renderer import renderer as renderer
     from palpate.operations.replay import replay as replay
     from palpate.operations.simulate import simulate as simulate
-    from palpate.reconstruction.checks.checkup import Checkup as Checkup
+    from palpate.reconstruction.checks.finding import Checkup as Checkup
     from palpate.reconstruction.pipeline import Reconstruction as Reconstruction
     from palpate.render.base import Renderer as Renderer
     from palpate.render.press import Curve as Curve
@@ -80,10 +80,10 @@ _OTHERS = {
     "palpate.operations._declare": "options",
     "palpate.mechanics.recording.recording": "Recording",
     "palpate.importing.imported": "Imported",
-    "palpate.importing.opened": "Opened",
+    "palpate.importing.kinds": "Opened",
     "palpate.mechanics.recording.calibration": "Calibration",
     "palpate.diagnosis.compare.before_after": "Changes",
-    "palpate.reconstruction.checks.checkup": "Checkup",
+    "palpate.reconstruction.checks.finding": "Checkup",
     "palpate.diagnosis.specimen.result": "Material",
     "palpate.mechanics.model.model": "Model",
     "palpate.reconstruction.pipeline": "Reconstruction",

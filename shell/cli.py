@@ -12,8 +12,8 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from palpate.child import listen
 from palpate.operations._list import commands
-from palpate.whole_imports import listen
 
 if TYPE_CHECKING:
     import argparse

@@ -62,7 +62,7 @@ def block_renderer(name: str = "fem") -> Any:
     from palpate.mechanics.model.model import Model, Support, Tool
     from palpate.mechanics.presses.making import of_places
     from palpate.mechanics.presses.table import FITS
-    from palpate.mechanics.shape.box_mesh import box_mesh
+    from palpate.mechanics.shape.tetmesh import box_mesh
 
     mesh = box_mesh((2, 2, 2), (_SIZE_M,) * 3).quadratic()
     up = np.array([0.0, 0.0, 1.0])

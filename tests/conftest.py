@@ -115,4 +115,4 @@ def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def nothing_to_press(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports do not carry the page of their object: seconds each, and tested in tests/shell/exporting."""
-    monkeypatch.setattr("palpate.exporting.page.button.button", lambda model: "")
+    monkeypatch.setattr("palpate.exporting.page.document.button", lambda model: "")

@@ -23,8 +23,7 @@ from palpate.mechanics.contact.edges import fitted, laid
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.disk.writing import atomic_file
 from palpate.mechanics.press_solver.press import PressOptions, PressSolver
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from tools.script import script
 
 RADIUS_M, NU = 5e-3, 0.49

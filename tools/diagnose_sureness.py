@@ -20,7 +20,7 @@ from scipy.special import expit
 
 from benchmarks.timing import table
 from palpate.diagnosis.search.naming import WEIGHTS
-from palpate.diagnosis.verdict.corrections import SURENESS_FILE, UNNAMED, how_named
+from palpate.diagnosis.verdict.conclusion import SURENESS_FILE, UNNAMED, how_named
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from palpate.diagnosis.verdict.corrections import WIDENING_FILE
+from palpate.diagnosis.verdict.conclusion import WIDENING_FILE
 from palpate.mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
 from tools.script import script

@@ -20,8 +20,7 @@ from palpate.diagnosis.instrument.instrument_effects import InstrumentOffsets, f
 from palpate.diagnosis.instrument.support_readings import rigid_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.fit import Fit, bounds_of
-from palpate.diagnosis.search.intervals import covariance
+from palpate.diagnosis.search.fit import Fit, bounds_of, covariance
 from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
 from palpate.mechanics.effects.backlash import EFFECT as PLAY
 from palpate.mechanics.effects.base import Effect

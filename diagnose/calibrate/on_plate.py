@@ -11,7 +11,7 @@ from palpate.mechanics.errors import ContactError
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import delayed
-from palpate.reconstruction.steps.s1_filter.low_pass import low_pass
+from palpate.reconstruction.steps.s1_filter.noise import low_pass
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 
 _DELAYS_S = np.arange(-0.04, 0.0401, 0.001)

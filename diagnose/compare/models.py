@@ -29,7 +29,7 @@ from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.presses.table import MARGIN_S, Presses
 from palpate.mechanics.progress import Progress, silent
-from palpate.reconstruction.steps.s6_one_d.one_d import columns, fit_robust, low_passed
+from palpate.reconstruction.steps.s6_one_d import columns, fit_robust, low_passed
 from palpate.reconstruction.steps.s7_modulus.modulus_field import (
     LAW_ERROR,
     FieldSites,

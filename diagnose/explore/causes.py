@@ -23,8 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.diagnosis.explore.estimate import Estimate
-from palpate.diagnosis.explore.forms import Act
-from palpate.diagnosis.explore.weighing import Weighing, weigh
+from palpate.diagnosis.explore.weighing import Act, Weighing, weigh
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import AttributionOptions
 from palpate.mechanics.effects.registry import effect

@@ -21,21 +21,21 @@ from palpate.mechanics.progress import Clock
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.shape.nearest import distance
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.reconstruction.shapes.evidence import LEAST_TOUCHES
-from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions
+from palpate.reconstruction.shapes.fit import LEAST_TOUCHES
+from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s1_filter.signals import filtered_of
 from palpate.reconstruction.steps.s1_filter.tool_weight import ToolWeight
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
-from palpate.reconstruction.steps.s4_surface.casting import cast
-from palpate.reconstruction.steps.s4_surface.surface import (
+from palpate.reconstruction.steps.s4_surface import (
     Surface,
     SurfaceOptions,
+    cast,
     evidence_of,
     reconstruct_surface,
 )
 from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, mesh_surface, uncertainty_at
-from palpate.reconstruction.steps.s6_one_d.one_d import OneD, fit_robust, profiles
+from palpate.reconstruction.steps.s6_one_d import OneD, fit_robust, profiles
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
 from palpate.reconstruction.steps.s7_modulus.shape_error import compliance_covariance, shape_gradients
 

@@ -12,12 +12,11 @@ from scipy.spatial import cKDTree
 from palpate.diagnosis.explore.candidates import TOUCH_ERROR_M, ReachOptions
 from palpate.diagnosis.explore.causes import Causes, causes_of
 from palpate.diagnosis.explore.estimate import LEAST_PRESSES, Estimate, updated
-from palpate.diagnosis.explore.explored import Explored, Step
 from palpate.diagnosis.explore.goals import GoalOptions, GoalState
 from palpate.diagnosis.explore.modulus import modulus_beside
 from palpate.diagnosis.explore.segments import Instrument, Segment, check_joined, join, split
 from palpate.diagnosis.explore.state import State, cause_goal
-from palpate.diagnosis.explore.suggestion import Situation, Suggestion, suggest
+from palpate.diagnosis.explore.suggestion import Explored, Situation, Step, Suggestion, suggest
 from palpate.diagnosis.explore.weighing import Weighing
 from palpate.mechanics.errors import (
     ContactError,
@@ -31,7 +30,7 @@ from palpate.mechanics.progress import Clock
 from palpate.mechanics.quantities import USUAL_POISSON_RATIO
 from palpate.mechanics.recording.recording import Recording, write_recording
 from palpate.mechanics.shape.nearest import distance
-from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 
 Order = Callable[[np.ndarray, np.ndarray, np.ndarray, np.random.Generator], int]

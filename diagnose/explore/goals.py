@@ -10,8 +10,8 @@ from scipy.special import erf
 
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import option
-from palpate.reconstruction.shapes.evidence import LEAST_TOUCHES
-from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.shapes.fit import LEAST_TOUCHES
+from palpate.reconstruction.steps.s4_surface import Surface
 
 
 @dataclass(frozen=True)

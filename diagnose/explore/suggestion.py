@@ -1,22 +1,34 @@
-"""What to do next, and why: the touch that makes the most progress a second, or the word to stop."""
+"""What to do next, and why: the touch that makes the most progress a second, or the word to stop.
+
+What an exploration came to: what was known after each touch, and why it ended.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from palpate.diagnosis.explore.candidates import Candidate, Known, ReachOptions, first_places, ranked
+from palpate.diagnosis.explore.candidates import (
+    RIGID_S,
+    Candidate,
+    Known,
+    ReachOptions,
+    first_places,
+    ranked,
+    separations,
+    support_gain,
+)
 from palpate.diagnosis.explore.causes import Causes, words
 from palpate.diagnosis.explore.estimate import LEAST_PRESSES, Estimate
 from palpate.diagnosis.explore.goals import GoalOptions
 from palpate.diagnosis.explore.modulus import log_sd
-from palpate.diagnosis.explore.separating import RIGID_S, separations, support_gain
 from palpate.diagnosis.explore.state import State
 from palpate.diagnosis.explore.weighing import Weighing
-from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.mechanics.result import Result
+from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusOptions
 
 FAR_FROM = 3.0
@@ -224,3 +236,38 @@ def _why(s: Situation, best: Candidate) -> str:
         f"95 % of the surface is known within {1e3 * now.now:.1f} mm and {1e3 * now.goal:.1f} mm is "
         "asked for: here it is least known"
     )
+
+
+@dataclass(frozen=True)
+class Step:
+    """One touch: what was asked for (None: nothing was, as of touches that an earlier run made), and what was
+    known after it."""
+
+    asked: Suggestion | None
+    state: State
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Explored(Result):
+    """An exploration so far, by `Explorer.explored`.
+
+    path: of its recording, "" where none was written. last: what would be done next, or the word to stop with
+    its reason. estimate: shape, touches and modulus. truth: of a phantom, the stated values. It prints, plots
+    (modulus and surface over the touches), and writes its page.
+    """
+
+    path: str
+    steps: tuple[Step, ...]
+    state: State
+    last: Suggestion
+    goals: GoalOptions
+    estimate: Estimate
+    truth: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """The figures of `palpate explore --json`."""
+        steps = [
+            {"suggest": s.asked.table(), "state": s.state.table()} for s in self.steps if s.asked is not None
+        ]
+        truth = {"truth": dict(self.truth)} if self.truth else {}
+        return {"recording": self.path, "steps": steps, **self.state.table(), **truth}

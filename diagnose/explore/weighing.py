@@ -1,4 +1,6 @@
-"""What evidence is weighed from: every form of a cause as a change of force, beside noise and our own errors.
+"""Forms of a cause: what each of them does to a prediction, over its parameters and places.
+
+What evidence is weighed from: every form of a cause as a change of force, beside noise and our own errors.
 
 The likelihood is Gaussian and linear about the ideal model: the modulus is free; first touches, places and
 the law's own errors (those of one place and those that all places share) have widths of their own
@@ -7,33 +9,110 @@ the law's own errors (those of one place and those that all places share) have w
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from palpate.diagnosis.explore.estimate import MESH_M, Estimate, solved_sites
-from palpate.diagnosis.explore.forms import Act, balls, forms_of, softer
 from palpate.diagnosis.forward.prediction import Forward
-from palpate.diagnosis.forward.touches import reached, touches_of
+from palpate.diagnosis.forward.touches import reached, touches_of, unobservable_effects
 from palpate.diagnosis.instrument.free_air import free_air_of
 from palpate.diagnosis.instrument.instrument_effects import find_instrument_offsets
 from palpate.diagnosis.instrument.support_readings import rigid_of
 from palpate.diagnosis.options import NuisanceOptions
-from palpate.diagnosis.search.descent import fit
+from palpate.diagnosis.search.descent import first_touches, fit
 from palpate.diagnosis.search.fit import Fit, settings_of
 from palpate.diagnosis.search.gaps import modulus_share
 from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
-from palpate.diagnosis.search.starts import first_touches
 from palpate.diagnosis.search.whiten import Whitener
+from palpate.mechanics.compliance.far_field import energy_fields
 from palpate.mechanics.compliance.pressed_places import places_at
-from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.effects.settings import Settings
-from palpate.mechanics.gaussian import squared_exponential
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.statistics import squared_exponential
 from palpate.reconstruction.steps.s5_mesh.meshing import uncertainty_at
+
+Act = Callable[[Settings, Forward], None]
+"""Sets one form of a cause in a prediction."""
+SHARES = (0.3, 1.0, 3.0)
+"""Steps from where an effect does nothing, of its starts, at which its form is taken."""
+MOVES = 5
+"""Steps of a parameter that is moved from where it does nothing."""
+BALL_GRID_M, BALL_RADII_M, BALL_SHARE = 0.014, (0.008, 0.012), 0.5
+"""Balls that are weighed: apart, radii, and the share by which a form is softer."""
+
+
+def causes_tried(presses: Presses) -> list[Effect]:
+    """Effects that may be the cause: those that a quick diagnosis searches for and such presses show, but for
+    what can take the form of others."""
+    unobservable = unobservable_effects(presses)
+    able = [e for e in effects() if e.role is Role.SEARCHED and e.name not in unobservable]
+    return [e for e in able if not (e.hints.any_form or e.hints.expensive)]
+
+
+def forms_of(forward: Forward) -> list[tuple[str, Act]]:
+    """(name, act) pairs: every form of each cause but the inclusion, whose places the object gives."""
+    forms: list[tuple[str, Act]] = []
+    laws: dict[str, str] = {}
+    for each in causes_tried(forward.touches):
+        # of the laws of one phenomenon the first stands for all
+        name = laws.setdefault(each.hints.phenomenon, each.name) if each.hints.phenomenon else each.name
+        if each.hints.seek is None:
+            forms += [(name, _acting(each, values)) for values in _values(each)]
+    return forms
+
+
+def _acting(each: Effect, values: np.ndarray) -> Act:
+    return lambda settings, scene: each.act(settings, values, scene)
+
+
+def _values(each: Effect) -> list[np.ndarray]:
+    """Of its forms: steps towards its starts, and of what starts where it does nothing each parameter moved,
+    up and down."""
+    low, high = each.bounds
+    made: dict[bytes, np.ndarray] = {}
+    for start in each.starts():
+        towards = [share * (start - each.ideal) for share in SHARES]
+        if not (start - each.ideal).any():
+            steps = np.diag([MOVES * p.step for p in each.parameters])
+            towards = [*steps, *(-steps)]
+        for way in towards:
+            value = np.clip(each.ideal + way, low, high)
+            made.setdefault(value.round(9).tobytes(), value)
+    return list(made.values())
+
+
+def balls(forward: Forward) -> list[np.ndarray]:
+    """(p,) 1/m each: by how much more each place gives, unit modulus, over a softer ball on a grid inside the
+    object; to first order in its energy."""
+    places = forward.places
+    fields = energy_fields(places)
+    low, high = fields.centroid.min(axis=0), fields.centroid.max(axis=0)
+    axes = [np.arange(a + BALL_GRID_M / 2, b, BALL_GRID_M) for a, b in zip(low, high, strict=True)]
+    centres = np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1).T
+    made = []
+    for centre in centres:
+        away = np.linalg.norm(fields.centroid - centre, axis=1)
+        if away.min() > 0.5 * BALL_GRID_M:
+            continue
+        for radius in BALL_RADII_M:
+            share = np.clip((radius - away) / 0.004 + 0.5, 0.0, 1.0)
+            made.append(BALL_SHARE * (fields.energy[:, :, 0, 0] @ share)[places.place])
+    return made
+
+
+def softer(compliance: np.ndarray) -> Act:
+    def act(settings: Settings, scene: Forward) -> None:
+        settings.far = settings.far.copy()
+        settings.far[:, 0, 0] += compliance
+
+    return act
+
 
 LEAST_PRESSES = 6
 SUPPORT_GIVES = 1.5e-5

@@ -20,10 +20,8 @@ from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.other_simulator.stated import StatedForward
 from palpate.diagnosis.search.attribution import Attribution, attribute
 from palpate.diagnosis.search.descent import Descent
-from palpate.diagnosis.search.detectable import SEEN
-from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.fit import Fit, settings_of
-from palpate.diagnosis.search.intervals import parameter_intervals
+from palpate.diagnosis.search.evidence import SEEN, Search
+from palpate.diagnosis.search.fit import Fit, parameter_intervals, settings_of
 from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours, never_worse
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects

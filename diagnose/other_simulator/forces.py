@@ -1,4 +1,6 @@
-"""Another simulator's forces along the recorded path, read and set beside the recording's presses.
+"""Which presses a slow simulator is run over.
+
+Another simulator's forces along the recorded path, read and set beside the recording's presses.
 
 Nothing about them is guessed in silence: what is unclear is refused with the option that settles it, what was
 interpolated or left out is said (`Aligned.notes`).
@@ -11,10 +13,28 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.diagnosis.forward.touches import LEAST_PRESSES
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.options import option
 from palpate.mechanics.presses.table import LEAD_S, Presses
+
+
+def spread_out(presses: Presses, most: int | None) -> np.ndarray:
+    """(p,) bool: at most so many presses (None: all, never fewer than a diagnosis needs), as far from each
+    other as they are short. Fewer are always some of more."""
+    count = len(presses) if most is None else min(max(most, LEAST_PRESSES), len(presses))
+    lasts = presses.end_s - presses.onset_s + 2 * LEAD_S
+    chosen = np.zeros(len(presses), dtype=bool)
+    away = np.ones(len(presses))
+    for _ in range(count):
+        worth = np.where(chosen, -1.0, away / lasts)
+        new = int(np.argmax(worth))
+        distance = np.linalg.norm(presses.point - presses.point[new], axis=1)
+        away = distance if not chosen.any() else np.minimum(away, distance)
+        chosen[new] = True
+    return chosen
+
 
 COLUMNS = ("t", "fx", "fy", "fz")
 LONGEST_GAP_S = 0.03

@@ -12,7 +12,6 @@ import numpy as np
 
 from palpate.diagnosis.numerics.registry import NAMES, numerical
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
-from palpate.diagnosis.other_simulator.advice import advice_of
 from palpate.diagnosis.other_simulator.against_law import Numerics
 from palpate.diagnosis.other_simulator.beside import Sides, beside, named_numerics
 from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions, aligned
@@ -24,10 +23,10 @@ from palpate.diagnosis.other_simulator.parts import (
     law_at,
     measured_parameters,
     reality_of,
+    sizes_alone,
     wrong_parameters,
 )
-from palpate.diagnosis.other_simulator.result import Part, SimulatedGap, Simulator
-from palpate.diagnosis.other_simulator.sizes import sizes_alone
+from palpate.diagnosis.other_simulator.result import Part, SimulatedGap, Simulator, advice_of
 from palpate.diagnosis.other_simulator.stated import Stated
 from palpate.diagnosis.pipeline import diagnose, with_tip_of
 from palpate.diagnosis.search.gaps import closed_share_ci95

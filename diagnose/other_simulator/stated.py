@@ -15,8 +15,8 @@ from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
 from palpate.mechanics.effects.settings import STICKS, Settings
 from palpate.mechanics.effects.tip_radius import EFFECT as TIP
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.key_values import number, pairs
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.names import number, pairs
 from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 
 _FRICTION = Key(low=0.0, high=100.0, unknown=True)

@@ -1,9 +1,13 @@
-"""The optimum of one set of effects, and what its values mean to a prediction."""
+"""The optimum of one set of effects, and what its values mean to a prediction.
+
+How sure a fit is of its parameters: intervals of the contract's keys, drawn from its covariance.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -91,3 +95,59 @@ def bounds_of(
             prior.append(0.0 if p.prior_std is None else 1 / p.prior_std**2)
             centre.append(p.ideal)
     return np.array(low), np.array(high), np.array(step), np.array(prior), np.array(centre)
+
+
+DRAWS = 200
+
+
+def covariance(found: Fit, slowness: float, dof: float) -> np.ndarray:
+    """(k, k) of the fit's values: the whitened curvature, widened by the lack of fit, by slow noise, and to
+    what the sites' own pulls scatter (cluster-robust, sites as clusters)."""
+    total = found.gram.sum(axis=0)
+    hessian = total[1:, 1:] + np.diag(found.prior)
+    hessian = hessian + 1e-9 * np.diag(np.maximum(np.diag(hessian), 1e-12))
+    inverse = np.linalg.inv(hessian)
+    chi = max(1.0, float(total[0, 0] / dof))
+    formal = inverse * chi * slowness
+    pulls = found.gram[:, 0, 1:]
+    groups = len(pulls)
+    pulls = pulls - pulls.mean(axis=0)
+    robust = inverse @ (pulls.T @ pulls) @ inverse * groups / max(groups - 1, 1)
+    ratio = np.sqrt(np.maximum(np.diag(robust) / np.maximum(np.diag(formal), 1e-300), 1.0))
+    return formal * ratio[:, None] * ratio[None, :]
+
+
+def parameter_intervals(
+    found: Fit, name: str, forward: Forward, dof: float, rng: np.random.Generator
+) -> dict[str, list[Any]]:
+    """{key: [low, high]} at 95 % for every number (or list of numbers) that the effect reports.
+
+    An effect's `systematic` (standard deviations of its parameters that noise does not hold) is added. Where
+    the bounds cut the draws off, the interval ends at the bound.
+    """
+    effect = next(e for e in found.effects if e.name == name)
+    k = len(effect.parameters)
+    if k == 0:
+        return {}
+    own = found.place_of(name)
+    spread = covariance(found, forward.touches.noise.variance_inflation, dof)[own, own]
+    systematic = np.array(effect.hints.systematic or np.zeros(k))
+    share = np.array(effect.hints.systematic_share or np.zeros(k))
+    spread = spread + np.diag(systematic**2 + (share * found.values[own]) ** 2)
+    low, high = effect.bounds
+    draws = rng.multivariate_normal(found.values[own], spread, DRAWS, check_valid="ignore")
+    draws *= 1 + effect.hints.common_factor * rng.standard_normal((DRAWS, 1))
+    for i in effect.hints.signed:
+        # what was named is known to be harder or softer; how much is what the interval says
+        draws[:, i] = np.sign(found.values[own][i]) * np.abs(draws[:, i])
+    reports = [effect.report(v, forward, found.modulus) for v in np.clip(draws, low, high)]
+    stated = effect.report(found.values[own], forward, found.modulus)
+    intervals = {}
+    for key, value in stated.items():
+        if isinstance(value, (bool, str)):
+            continue
+        shape = np.shape(value)
+        alike = [r[key] for r in reports if np.shape(r[key]) == shape]
+        if len(alike) > DRAWS // 4:
+            intervals[key] = np.quantile(np.asarray(alike, float), [0.025, 0.975], axis=0).tolist()
+    return intervals

@@ -10,7 +10,7 @@ from scipy.integrate import trapezoid
 
 from palpate.diagnosis.specimen.bench import HAND_TIP_M, Bench
 from palpate.mechanics.contact.dent import dent_law
-from palpate.reconstruction.steps.s1_filter.low_pass import white_noise_std
+from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
 APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")
 _BLOCKS = 8

@@ -23,9 +23,9 @@ from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
 from palpate.mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M, parse_unit, unit_of_key
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.robust import spread_about_zero
+from palpate.mechanics.statistics import spread_about_zero
 from palpate.reconstruction.geometry.slab import flat_mesh, half_space_size
-from palpate.reconstruction.steps.s1_filter.low_pass import white_noise_std
+from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 from palpate.reconstruction.steps.s3_contacts.contact_law import Loading, first_touches
 
 HAND_TIP_M, PEAK_N = USUAL_TIP_RADIUS_M, 1.0

@@ -13,11 +13,14 @@ from scipy.stats import t as student
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.specimen.approach import approach_of
 from palpate.diagnosis.specimen.bench import Bench, Curve, bench_of
-from palpate.diagnosis.specimen.bench_diagnosis import diagnose_bench, modulus_interval, unseen_holds
-from palpate.diagnosis.specimen.few_curves import INDENTATION_UNKNOWN, material_of_few
+from palpate.diagnosis.specimen.bench_diagnosis import (
+    diagnose_bench,
+    held_out_rivals,
+    modulus_interval,
+    unseen_holds,
+)
+from palpate.diagnosis.specimen.few_curves import INDENTATION_UNKNOWN, material_of_few, seen_of_all
 from palpate.diagnosis.specimen.result import MachineTests, Material
-from palpate.diagnosis.specimen.rivals import held_out_rivals
-from palpate.diagnosis.specimen.seen import seen_of_all
 from palpate.diagnosis.specimen.zero import bias, late_contact
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.effects.finite_strain import EFFECT as FINITE

@@ -16,7 +16,7 @@ import numpy as np
 from palpate.diagnosis.specimen.bench import Bench, Curve
 from palpate.diagnosis.specimen.yielding import Way, left_out_error
 from palpate.mechanics.contact.dent import dent_law
-from palpate.reconstruction.steps.s1_filter.low_pass import white_noise_std
+from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
 _PUSHES, _OFF = 0.03, 0.01
 """Share of the peak that first rows push by where a contact may be late; that a bias must have to be said."""

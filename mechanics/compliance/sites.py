@@ -17,8 +17,7 @@ from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.frames import local_frames
-from palpate.mechanics.model.material import Ball
-from palpate.mechanics.model.moduli import with_balls
+from palpate.mechanics.model.material import Ball, with_balls
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
 from palpate.mechanics.shape.refine import refined_around, refined_near_surface, typical_edge

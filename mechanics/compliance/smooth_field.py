@@ -18,7 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
-from palpate.mechanics.gaussian import matern_5_2
+from palpate.mechanics.statistics import matern_5_2
 
 LEAST_LENGTH_M = 0.003
 LENGTHS = 9

@@ -28,8 +28,7 @@ from palpate.mechanics.compliance.sites import (
 from palpate.mechanics.elastic.floor import carried_by_floor
 from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.elastic.solver import Solver
-from palpate.mechanics.model.material import Ball
-from palpate.mechanics.model.moduli import with_balls
+from palpate.mechanics.model.material import Ball, with_balls
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
 from palpate.mechanics.shape.nearest import closest

@@ -8,9 +8,8 @@ from palpate.mechanics.compliance.far_field import energy_fields, far_with_weigh
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import Scene, Settings
-from palpate.mechanics.model.material import GRADIENT, Gradient
+from palpate.mechanics.model.material import GRADIENT, Gradient, gradient_ratio, height_share
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.model.moduli import gradient_ratio, height_share
 
 
 def gradient(log_ratio: float) -> Gradient:

@@ -2,7 +2,7 @@
 
 The modulus under a contact of radius a is E ratio^w(thickness / a), w Gao's weight of a film (Gao, Chiu & Lee
 1992), 0 for a thin and 1 for a thick one: stiff at first touch, less so deeper. How the skin holds the whole
-object together is in the far field, by mechanics.model.moduli.skin_ratio.
+object together is in the far field, by mechanics.model.material.skin_ratio.
 """
 
 from __future__ import annotations

@@ -16,9 +16,13 @@ from palpate.mechanics.model.material import (
     UNKNOWN,
     Material,
     finite,
+    gradient_ratio,
+    height_share,
     positive,
+    skin_ratio,
+    with_balls,
+    within_limits,
 )
-from palpate.mechanics.model.moduli import gradient_ratio, height_share, skin_ratio, with_balls, within_limits
 from palpate.mechanics.presses.making import no_presses
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M

@@ -9,11 +9,8 @@ import numpy as np
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.press_solver.body import Body, BodyMaterial
 from palpate.mechanics.press_solver.contact import SphereContact
-from palpate.mechanics.press_solver.curved_faces import FeltSurface
-from palpate.mechanics.press_solver.equilibrium import Path
-from palpate.mechanics.press_solver.even_surface import even_surface
-from palpate.mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
-from palpate.mechanics.press_solver.settling import Settling
+from palpate.mechanics.press_solver.equilibrium import Path, Settling
+from palpate.mechanics.press_solver.graded_mesh import FeltSurface, drawn_to, even_surface, graded_mesh
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 _LONGEST = 1.3

@@ -12,7 +12,7 @@ from palpate.mechanics.presses.repeats import SITE_M, sites_of
 from palpate.mechanics.presses.table import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import ON_SUPPORT, Segment, runs
-from palpate.mechanics.robust import read_columns, spread_about_zero
+from palpate.mechanics.statistics import read_columns, spread_about_zero
 
 AROUND_S = 0.3
 """Samples are kept this long before first and after last touch."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.mechanics.robust import weighted_median
 from palpate.mechanics.shape.nearest import triangle_areas
 from palpate.mechanics.shape.tetmesh import EDGES, TetMesh
+from palpate.mechanics.statistics import weighted_median
 
 
 def typical_edge(mesh: TetMesh) -> float:

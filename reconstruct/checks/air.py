@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.reconstruction.checks.finding import Finding
 from palpate.reconstruction.checks.samples import Samples
-from palpate.reconstruction.steps.s1_filter.low_pass import noise_gain
+from palpate.reconstruction.steps.s1_filter.noise import noise_gain
 
 _SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
 _LATE_S, _LATEST_S = 0.075, 0.25

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import label, maximum, median_filter
 
 from palpate.mechanics.recording.segments import runs, within
-from palpate.mechanics.robust import spread_about_zero
+from palpate.mechanics.statistics import spread_about_zero
 from palpate.reconstruction.checks.finding import Finding, decades_of_tail, p_words, sure
 from palpate.reconstruction.checks.samples import CHANNELS, Samples
 

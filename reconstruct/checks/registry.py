@@ -16,15 +16,13 @@ from palpate.mechanics.recording.recording import Recording, base_model_of
 from palpate.reconstruction.checks.air import air, delay
 from palpate.reconstruction.checks.channels import channels
 from palpate.reconstruction.checks.clock import clock
-from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.finding import Finding, Outcome, outcome
 from palpate.reconstruction.checks.handedness import handedness
-from palpate.reconstruction.checks.outcome import Outcome, outcome
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
 from palpate.reconstruction.checks.units import QUANTITIES, measured, settled
-from palpate.reconstruction.geometry.known_base import base_of_model
-from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
-from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions
+from palpate.reconstruction.geometry.stated import GeometryOptions, base_of_model, stated_geometry
+from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
 

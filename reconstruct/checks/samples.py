@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from palpate.mechanics.recording.recording import Recording
-from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions, white_noise_std
+from palpate.reconstruction.steps.s1_filter.noise import FilterOptions, white_noise_std
 from palpate.reconstruction.steps.s1_filter.signals import Filtered, filtered_of
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans, RoughTouches
 from palpate.reconstruction.steps.s3_contacts.force_delay import Delay

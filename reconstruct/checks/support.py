@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from palpate.mechanics.robust import spread_about_zero, weighted_median
+from palpate.mechanics.statistics import spread_about_zero, weighted_median
 from palpate.reconstruction.checks.finding import Finding
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 from palpate.reconstruction.steps.s3_contacts.on_support import supported

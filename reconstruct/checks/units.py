@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import norm
 
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.robust import weighted_quantile
+from palpate.mechanics.statistics import weighted_quantile
 from palpate.reconstruction.checks.finding import SURE_ODDS, Finding, p_words, sure
 from palpate.reconstruction.checks.samples import Samples, Units
 

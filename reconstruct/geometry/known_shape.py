@@ -19,8 +19,6 @@ from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.shape.flat_foot import Standing, standing
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.shape.true_shape import TrueShape
-from palpate.reconstruction.geometry.in_device_frame import Placed, foot_rim
-from palpate.reconstruction.geometry.known_base import base_of_rim
 from palpate.reconstruction.geometry.registration import (
     SURFACE_SD_M,
     Body,
@@ -29,12 +27,12 @@ from palpate.reconstruction.geometry.registration import (
     register,
 )
 from palpate.reconstruction.geometry.slab import place_slab
-from palpate.reconstruction.geometry.stated import GeometryOptions
-from palpate.reconstruction.shapes.coarse_drawing import decimated
+from palpate.reconstruction.geometry.stated import GeometryOptions, Placed, base_of_rim, foot_rim
+from palpate.reconstruction.shapes.drawing import decimated
 from palpate.reconstruction.shapes.polyhedron import refine
-from palpate.reconstruction.steps.s2_base.boundary import BoundaryOptions
+from palpate.reconstruction.steps.s2_base import BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
-from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError
 
 _ALIKE = 1.5

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from palpate.mechanics.robust import EFFICIENT, spread_about_zero, tukey
 from palpate.mechanics.shape.tetmesh import vertex_normals
+from palpate.mechanics.statistics import EFFICIENT, spread_about_zero, tukey
 
 DIRECTION_RAD = np.radians(15.0)
 """Standard deviation of a first force's direction about the normal."""

@@ -8,16 +8,13 @@ from palpate.mechanics.compliance.sites import SURFACE_EDGE_M
 from palpate.mechanics.errors import SurfaceError
 from palpate.mechanics.frames import support_axes
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.robust import biweight
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.reconstruction.geometry.in_device_frame import Placed, foot_rim
-from palpate.reconstruction.geometry.known_base import base_of_rim
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
+from palpate.mechanics.statistics import biweight
 from palpate.reconstruction.geometry.registration import (
     DIRECTION_RAD,
 )
-from palpate.reconstruction.geometry.stated import GeometryOptions
-from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.geometry.stated import GeometryOptions, Placed, base_of_rim, foot_rim
+from palpate.reconstruction.steps.s4_surface import Surface
 
 _MARGIN, _CELLS = 2.0, 40
 """A slab reaches this many thicknesses beyond the touches, in at most so many cells a side."""

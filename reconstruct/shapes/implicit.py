@@ -9,9 +9,8 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.errors import SurfaceError
 from palpate.mechanics.shape.nearest import distance
-from palpate.reconstruction.shapes.evidence import Evidence
-from palpate.reconstruction.shapes.fit import LEAN_M, Seen
-from palpate.reconstruction.shapes.points import farthest_points
+from palpate.reconstruction.shapes.fit import LEAN_M, Evidence, Seen
+from palpate.reconstruction.shapes.outline import farthest_points
 
 _OFF_M = 0.004
 _RIM_SPACING_M = 0.005

@@ -15,8 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from palpate.mechanics.gaussian import matern_3_2
-from palpate.mechanics.robust import spread_about_zero
+from palpate.mechanics.statistics import matern_3_2, spread_about_zero
 from palpate.reconstruction.shapes.fit import LEAN_SPREAD_M, OUTLINE_ERROR_M, Seen, residuals
 from palpate.reconstruction.shapes.shape import Shape, gradient, parameter_slopes
 

@@ -9,8 +9,7 @@ from palpate.mechanics.contact.dent import BENT
 from palpate.mechanics.contact.touch import touch_solve
 from palpate.mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
 from palpate.mechanics.kernels import part
-from palpate.render.fem.frames import turn_frame
-from palpate.render.fem.held_tips import carry
+from palpate.render.fem.held_tips import carry, turn_frame
 from palpate.render.surface.walking import place, walk
 
 CONVERGED_N = 1e-5

@@ -18,8 +18,8 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
 from palpate.mechanics.errors import OptionError, PalpateError
-from palpate.mechanics.key_values import number, pairs, words_of
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.names import number, pairs, words_of
 from palpate.mechanics.shape.refine import refined_around
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.render.base import Renderer, check_radii

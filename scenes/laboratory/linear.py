@@ -12,12 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.mechanics.elastic.partial_factor import partial_factor
-from palpate.scenes.laboratory.assembly import Assembly
+from palpate.mechanics.elastic.solver import partial_factor
 from palpate.scenes.laboratory.contact import Grip, SphereContact
 from palpate.scenes.laboratory.solid import Solid
 from palpate.scenes.laboratory.solver import LabError
-from palpate.scenes.laboratory.touching import Touching
+from palpate.scenes.laboratory.touching import Assembly, Touching
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,12 @@ from palpate.mechanics.recording.segments import Segment
 from palpate.scenes.laboratory.curves import Solving
 from palpate.scenes.laboratory.effects import Readings, effect
 from palpate.scenes.laboratory.effects.solid import scaled
-from palpate.scenes.laboratory.force import elastic_force
+from palpate.scenes.laboratory.force import beyond_quasilinear, elastic_force
 from palpate.scenes.laboratory.frame import axes_of, quaternions, random_frame
 from palpate.scenes.laboratory.hand import HandOptions, band_noise
 from palpate.scenes.laboratory.motion import Motion, motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, TouchForce, touch_forces
 from palpate.scenes.laboratory.presses import PROTOCOLS, Touch
-from palpate.scenes.laboratory.relaxation import beyond_quasilinear
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, ball
 from palpate.scenes.laboratory.tracing import RATE_HZ, trace
 from palpate.scenes.phantoms import Phantom

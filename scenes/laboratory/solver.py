@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.mechanics.elastic.partial_factor import partial_factor
+from palpate.mechanics.elastic.solver import partial_factor
 from palpate.mechanics.errors import PalpateError
-from palpate.scenes.laboratory.assembly import Assembly
 from palpate.scenes.laboratory.contact import Grip, SphereContact
 from palpate.scenes.laboratory.solid import History, Solid
-from palpate.scenes.laboratory.touching import Touching
+from palpate.scenes.laboratory.touching import Assembly, Touching
 
 MOST_ITERATIONS = 40
 SLOW = 0.7

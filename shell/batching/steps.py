@@ -103,7 +103,7 @@ def _written(plan: Planned, step: str, result: Any, figures: Mapping[str, Any]) 
 def _draw_thumbnail(model: Any, path: Path) -> None:
     from matplotlib.figure import Figure
 
-    from palpate.show.object3d import draw_object
+    from palpate.show.scenery import draw_object
 
     figure = Figure(figsize=(1.6, 1.2))
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))

@@ -12,7 +12,7 @@ from palpate.importing.mapping import ROLES, Column, Said, time_of
 from palpate.importing.meaning import MOST_ODDS, Reading, clock_of, clock_starts, joined, settled_clock
 from palpate.importing.tables import Table
 from palpate.mechanics.errors import RecordingError
-from palpate.reconstruction.steps.s1_filter.low_pass import white_noise_std
+from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
 _SEARCH_S, _SURE = 3.0, 0.5
 _MOST_HZ = 2000.0

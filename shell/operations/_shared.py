@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.mechanics.disk.surface_files import UNITS, is_surface_file
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.key_values import pairs
+from palpate.mechanics.names import pairs
 from palpate.operations._declare import REQUIRED, Call, operand
 from palpate.operations._to_argparse import natural
 from palpate.render.registry import names, simulator_names

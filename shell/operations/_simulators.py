@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.key_values import pairs, words_of
+from palpate.mechanics.names import pairs, words_of
 from palpate.operations._declare import operand
 from palpate.render.options import DOCUMENTED, SETTINGS, RenderOptions
 from palpate.render.registry import create, simulator_names
@@ -89,7 +89,7 @@ def run_along(
 ) -> Ran:
     """Run a simulator along a recording's presses, `most` of them, spread over its places (None: all). One
     for which it finds no answer is left out, and said; raises OptionError where that leaves too few."""
-    from palpate.diagnosis.other_simulator.presses_to_run import spread_out
+    from palpate.diagnosis.other_simulator.forces import spread_out
     from palpate.reconstruction.presses_on_model import presses_on
     from palpate.render.replay import replay_touches
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.key_values import pairs
+from palpate.mechanics.names import pairs
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._run import say_next
 from palpate.operations._shared import seed_operand
@@ -85,7 +85,7 @@ def batch(asked: BatchOperands, call: Call) -> Batch:
     Raises OptionError.
     """
     from palpate.batching.plan import Choice
-    from palpate.batching.run import batch as run
+    from palpate.batching.plan import batch as run
 
     steps = tuple(asked.do.split(",")) if isinstance(asked.do, str) else tuple(asked.do)
     return run(

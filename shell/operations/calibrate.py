@@ -68,7 +68,7 @@ def calibrate(asked: CalibrateOperands, call: Call) -> Calibration:
     """
     from palpate.diagnosis.calibrate.on_object import calibrate_on_object
     from palpate.diagnosis.calibrate.on_plate import calibrate_on_plate
-    from palpate.reconstruction.geometry.in_device_frame import nowhere
+    from palpate.reconstruction.geometry.stated import nowhere
     from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
     if asked.rigid == (asked.modulus_pa is not None):

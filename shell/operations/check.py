@@ -17,7 +17,7 @@ from palpate.output import Output
 
 if TYPE_CHECKING:
     from palpate.operations._shared import RecordingLike
-    from palpate.reconstruction.checks.checkup import Checkup
+    from palpate.reconstruction.checks.finding import Checkup
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ def check(asked: CheckOperands, call: Call) -> Checkup:
     The result has findings, the gravest first, each with a stretch in s; `reconstruct` refuses what is grave.
     Raises RecordingError for what is no recording, and what `reconstruct` raises with `full`.
     """
-    from palpate.reconstruction.checks.checkup import Checkup
+    from palpate.reconstruction.checks.finding import Checkup
     from palpate.reconstruction.checks.registry import looked_at
     from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
 

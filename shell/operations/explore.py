@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.explore.candidates import ReachOptions
-from palpate.diagnosis.explore.explored import Explored
 from palpate.diagnosis.explore.explorer import Explorer, State, Suggestion
 from palpate.diagnosis.explore.goals import GoalOptions, check_goals
 from palpate.diagnosis.explore.segments import Instrument
+from palpate.diagnosis.explore.suggestion import Explored
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import check_ranges
 from palpate.mechanics.quantities import POISSON_RATIO
@@ -38,7 +38,7 @@ from palpate.operations._shared import (
 )
 from palpate.operations.simulate import effects_from
 from palpate.output import Output
-from palpate.robot.laboratory import RobotOptions
+from palpate.robot import RobotOptions
 
 if TYPE_CHECKING:
     from palpate.window.guide import Guide
@@ -164,7 +164,7 @@ def _in_window(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: Re
 
 
 def _by_robot(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: ReachOptions) -> Explored:
-    from palpate.robot.protocol import serve
+    from palpate.robot import serve
 
     if not (asked.rate_hz > 0 and asked.tip_radius_m > 0):
         raise OptionError("--rate and --tip-radius must be greater than 0")
@@ -180,7 +180,7 @@ def _by_robot(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: Rea
 
 
 def _on_phantom(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: ReachOptions) -> Explored:
-    from palpate.robot.laboratory import LaboratoryRobot
+    from palpate.robot import LaboratoryRobot
     from palpate.scenes.laboratory.session import SimulateOptions
     from palpate.scenes.phantoms import phantom
 

@@ -108,7 +108,7 @@ class ImportOperands:
         None,
         "what was understood; default: beside REC, 'none' for no picture",
         metavar="PNG",
-        writes="palpate.importing.write_imported:PICTURE",
+        writes="palpate.importing.imported:PICTURE",
         only="command",
         rare=True,
     )
@@ -154,7 +154,7 @@ def import_table(asked: ImportOperands, call: Call) -> Imported:
     The recording is in m, s and N, forces on the tool. Raises RecordingError where something needed is
     missing.
     """
-    from palpate.importing.questions import with_answers
+    from palpate.importing.kinds import with_answers
 
     return with_answers(_understood, asked, call)
 

@@ -78,7 +78,7 @@ def material(asked: MaterialOperands, call: Call) -> Material:
     Lengths m, moduli Pa. Raises RecordingError where a file cannot be read, ContactError
     where nothing is touched.
     """
-    from palpate.importing.questions import with_answers
+    from palpate.importing.kinds import with_answers
 
     return with_answers(_made, asked, call)
 

@@ -29,7 +29,7 @@ from palpate.operations._shared import (
 from palpate.output import Output
 
 if TYPE_CHECKING:
-    from palpate.importing.opened import Opened
+    from palpate.importing.kinds import Opened
     from palpate.mechanics.recording.recording import Recording
 
 
@@ -89,7 +89,7 @@ def open(asked: OpenOperands, call: Call) -> Opened:
     m, forces N, moduli Pa. Raises RecordingError where nothing can be understood, and what `reconstruct`,
     `material` and `model_of` raise.
     """
-    from palpate.importing.questions import with_answers
+    from palpate.importing.kinds import with_answers
 
     if not asked.files:
         raise OptionError("pp.open needs a file: name at least one")
@@ -107,14 +107,14 @@ def _opened(asked: OpenOperands, call: Call) -> Opened:
 
 
 def _model(asked: OpenOperands, call: Call) -> Opened:
-    from palpate.importing.opened import Opened
+    from palpate.importing.kinds import Opened
     from palpate.operations.load import load
 
     return Opened("model", _names(asked), {"took it for": "a MODEL"}, result=load(_only(asked)))
 
 
 def _mesh(asked: OpenOperands, call: Call) -> Opened:
-    from palpate.importing.opened import Opened
+    from palpate.importing.kinds import Opened
     from palpate.operations.model import model_of
 
     given = {"tip_radius_m": asked.tip_radius_m, "young_modulus_pa": asked.young_modulus_pa}
@@ -132,7 +132,7 @@ def _mesh(asked: OpenOperands, call: Call) -> Opened:
 
 
 def _curves(asked: OpenOperands, call: Call) -> Opened:
-    from palpate.importing.opened import Opened
+    from palpate.importing.kinds import Opened
     from palpate.operations.material import material
 
     names = (
@@ -170,7 +170,7 @@ def _reconstructed(
     notes: tuple[str, ...], odds: float | None,
 ) -> Opened:  # fmt: skip
     """Checked; reconstructed unless something is grave."""
-    from palpate.importing.opened import Opened
+    from palpate.importing.kinds import Opened
     from palpate.operations.check import check
     from palpate.operations.reconstruct import reconstruct
 

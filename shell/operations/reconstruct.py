@@ -20,10 +20,10 @@ from palpate.operations.read_recording import read_recording
 from palpate.output import Output, progress_bar
 from palpate.reconstruction.geometry.stated import GeometryOptions
 from palpate.reconstruction.pipeline import ReconstructOptions
-from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions
-from palpate.reconstruction.steps.s2_base.boundary import BoundaryOptions
+from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
+from palpate.reconstruction.steps.s2_base import BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions
-from palpate.reconstruction.steps.s4_surface.surface import SurfaceOptions
+from palpate.reconstruction.steps.s4_surface import SurfaceOptions
 from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusOptions
 from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.mechanics.disk.writing import JSON, PNG, atomic_file
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.key_values import number, pairs
-from palpate.mechanics.names import unknown
+from palpate.mechanics.names import number, pairs, unknown
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._run import say_next
 from palpate.operations._shared import SAMPLES, report_operand, save_operand, seed_operand

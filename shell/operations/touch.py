@@ -35,8 +35,8 @@ from palpate.render.options import RenderOptions
 from palpate.render.registry import names
 from palpate.render.support import SupportOptions
 from palpate.scenes.build import model_of
-from palpate.scenes.exploration import ExplorationOptions, explore
 from palpate.scenes.scene import Scene, load_scene, scene_names
+from palpate.scenes.virtual_presses import ExplorationOptions, explore
 from palpate.servo import SafetyOptions, ServoOptions, ServoReport
 from palpate.servo.started import StartedServo
 from palpate.warm_up import OF_A_TOUCH, OF_ITS_SERVO, warming_up

@@ -30,11 +30,11 @@ from palpate.mechanics.model.model import Model
 from palpate.render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
 from palpate.render.passivity import passivity_parameters
 from palpate.render.scene import TouchScene, in_the_air, scene_of
+from palpate.servo.clock import lock_memory, quiet_interpreter, real_time_thread
 from palpate.servo.device_thread import DeviceThread
 from palpate.servo.layout import ENABLE, MOST_TIPS, ROW, STOP, SharedArrays, SharedBlock
 from palpate.servo.loop import Program, ServoLoop, make_program
 from palpate.servo.options import ServoOptions
-from palpate.servo.realtime import lock_memory, quiet_interpreter, real_time_thread
 from palpate.servo.source import RendererSource
 from palpate.servo.tick import TickParameters, tick_arrays
 from palpate.warm_up import warm_up

@@ -20,8 +20,8 @@ from palpate.servo.layout import (
     TICKS,
     TIP_WIDTH,
     SharedArrays,
+    read_copy,
 )
-from palpate.servo.seqlock import read_copy
 
 
 @dataclass(frozen=True)

@@ -48,8 +48,12 @@ from palpate.servo.layout import (
     TICKS,
     TIP_WIDTH,
     SharedArrays,
+    begin_write,
+    end_write,
+    fence,
+    read_block,
+    write_block,
 )
-from palpate.servo.seqlock import begin_write, end_write, fence, read_block, write_block
 
 (
     IN_TIME,

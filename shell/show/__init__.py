@@ -24,9 +24,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from palpate.child import loaded_whole
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.result import Result, present_by
-from palpate.whole_imports import loaded_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,18 +40,18 @@ _KINDS: dict[str, str | ModuleType] = {
     "palpate.mechanics.model.model.Model": "model",
     "palpate.mechanics.recording.calibration.Calibration": "calibration",
     "palpate.reconstruction.pipeline.Reconstruction": "reconstruction",
-    "palpate.reconstruction.checks.checkup.Checkup": "check",
+    "palpate.reconstruction.checks.finding.Checkup": "check",
     "palpate.render.press.Curve": "curve",
     "palpate.render.replay.ReplayResult": "replay",
     "palpate.diagnosis.compare.comparison.Comparison": "comparison",
     "palpate.diagnosis.compare.before_after.Changes": "changes",
     "palpate.diagnosis.verdict.result.Diagnosis": "diagnosis",
     "palpate.diagnosis.other_simulator.result.SimulatedGap": "other_simulator",
-    "palpate.diagnosis.explore.explored.Explored": "exploration",
+    "palpate.diagnosis.explore.suggestion.Explored": "exploration",
     "palpate.diagnosis.specimen.result.Material": "material",
     "palpate.scenes.laboratory.simulate.Simulation": "simulation",
     "palpate.importing.imported.Imported": "imported",
-    "palpate.importing.opened.Opened": "opened",
+    "palpate.importing.kinds.Opened": "opened",
     "palpate.batching.summary.Batch": "batch",
     "palpate.demo.DemoResult": "demo",
 }

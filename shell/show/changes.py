@@ -9,12 +9,11 @@ import numpy as np
 
 from palpate.diagnosis.compare.before_after import Changes, Side
 from palpate.show.diagnosis.words import verdict
-from palpate.show.model_view import thing_of, usual_colourings
+from palpate.show.model import thing_of, usual_colourings
 from palpate.show.page import Page, file_words, new_figure
 from palpate.show.quantities import Quantity
 from palpate.show.scenery import add_dots, add_object
-from palpate.show.view3d import View
-from palpate.show.view3d_parts import Colouring
+from palpate.show.view3d import Colouring, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.mechanics.recording.recording import Recording
-from palpate.reconstruction.checks.checkup import Checkup
-from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.finding import Checkup, Finding
 from palpate.reconstruction.checks.samples import CHANNELS
 from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import readable

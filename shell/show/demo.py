@@ -9,19 +9,18 @@ import numpy as np
 
 from palpate.demo import DemoResult
 from palpate.diagnosis.verdict.result import Diagnosis
-from palpate.reconstruction.steps.s6_one_d.one_d import low_passed
+from palpate.reconstruction.steps.s6_one_d import low_passed
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.servo.report import ServoReport
 from palpate.show import model as made
 from palpate.show.diagnosis.gaps import known
 from palpate.show.diagnosis.words import force_words, spoken, verdict
-from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
-from palpate.show.object3d import Colours, draw_object, draw_touched
+from palpate.show.model import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import ERROR, UNCERTAINTY
 from palpate.show.reconstruction.exploration import force_over_time
-from palpate.show.view3d import View
-from palpate.show.view3d_parts import Colouring, Line
+from palpate.show.scenery import Colours, draw_object, draw_touched
+from palpate.show.view3d import Colouring, Line, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

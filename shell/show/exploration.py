@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.diagnosis.explore.explored import Explored, Step
+from palpate.diagnosis.explore.suggestion import Explored, Step
 from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import ORDER, UNCERTAINTY, softness
-from palpate.show.view3d import View
-from palpate.show.view3d_parts import Colouring, Thing
+from palpate.show.view3d import Colouring, Thing, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -174,7 +173,7 @@ def _rows(result: Explored) -> list[list[object]]:
 
 def _draw_places(result: Explored, ax: Axes) -> None:
     """The touches from above the support, mm, numbered."""
-    from palpate.show.object3d import level_axes
+    from palpate.show.scenery import level_axes
 
     surface = result.estimate.surface
     assert surface is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate.importing.opened import Opened
+from palpate.importing.kinds import Opened
 from palpate.show import steps_of, telling
 from palpate.show.page import Page
 

@@ -121,7 +121,7 @@ class Page:
         self._parts.append(view.html(self._figure(picture, caption)))
         self._live = True
         if model is not None:
-            from palpate.exporting.page.button import button
+            from palpate.exporting.page.document import button
 
             self._parts.append(button(model))
 

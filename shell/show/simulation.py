@@ -13,8 +13,7 @@ from palpate.scenes.laboratory.simulate import Simulation
 from palpate.show import recording as measured
 from palpate.show.page import Page, file_words, new_figure
 from palpate.show.quantities import DEPTH, ERROR, ORDER
-from palpate.show.view3d import View
-from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
+from palpate.show.view3d import Colouring, Line, Thing, Traces, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,13 +1,106 @@
-"""The live plots under the picture: force and depth of the last seconds."""
+"""The last seconds of a session as curves: force and depth over time.
+
+The scene's three directions in a corner of a picture; a letter that would lie on another is left out.
+
+The live plots under the picture: force and depth of the last seconds.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 import pyvista
+from vtkmodules.vtkRenderingCore import (
+    vtkActor2D,
+    vtkCoordinate,
+    vtkPolyDataMapper2D,
+    vtkRenderer,
+    vtkTextActor,
+)
 
-from palpate.window.last_seconds import Trace
 from palpate.window.lettering import set_type
 from palpate.window.widgets import ACCENT, GREY, SECOND
+
+
+class Trace:
+    """Rows of (time s, force N, depth m, second renderer's force N), the newest `seconds` of them."""
+
+    COLUMNS = 4
+
+    def __init__(self, seconds: float = 6.0, rate_hz: float = 1000.0) -> None:
+        self.seconds = seconds
+        self._rows = np.zeros((0, self.COLUMNS))
+        self._most = int(seconds * rate_hz * 1.2)
+
+    def add(self, rows: np.ndarray) -> None:
+        """Append (n, 4) rows; old ones fall off."""
+        if len(rows):
+            self._rows = np.vstack([self._rows, rows])[-self._most :]
+
+    def curves(self, points: int = 600) -> np.ndarray:
+        """(k, 4) at most `points` rows; time counts from now, so that it runs from -seconds to 0."""
+        rows = self._rows
+        if not len(rows):
+            return np.zeros((0, self.COLUMNS))
+        rows = rows[rows[:, 0] > rows[-1, 0] - self.seconds]
+        shown = rows[:: max(1, len(rows) // points)].copy()
+        shown[:, 0] -= rows[-1, 0]
+        return shown
+
+
+LENGTH, ROOM = 26.0, 12.0
+"""Of an axis, and between letters, pixels of a window of full size."""
+COLOURS = {"x": "#b3261e", "y": "#2e7d32", "z": "#1b4f9c"}
+
+
+class Axes:
+    """In a renderer's lower left corner; `update` turns them with the eye."""
+
+    def __init__(self, renderer: vtkRenderer) -> None:
+        self._renderer = renderer
+        self._lines = pyvista.PolyData()
+        self._lines.points = np.zeros((6, 3))
+        self._lines.lines = np.array([[2, 0, 1], [2, 2, 3], [2, 4, 5]]).ravel()
+        shades = [[*pyvista.Color(colour).int_rgb, 255] for colour in COLOURS.values()]
+        self._lines.GetCellData().SetScalars(
+            pyvista.convert_array(np.array(shades, dtype=np.uint8), name="shade")
+        )
+        mapper, place = vtkPolyDataMapper2D(), vtkCoordinate()
+        place.SetCoordinateSystemToViewport()
+        mapper.SetTransformCoordinate(place)
+        mapper.SetInputData(self._lines)
+        mapper.SetScalarModeToUseCellData()
+        actor = vtkActor2D()
+        actor.SetMapper(mapper)
+        actor.GetProperty().SetLineWidth(2.0)
+        renderer.AddViewProp(actor)
+        self.letters = [vtkTextActor() for _ in COLOURS]
+        for letter, (name, colour) in zip(self.letters, COLOURS.items(), strict=True):
+            letter.SetInput(name)
+            set_type(letter.GetTextProperty(), 12, True, colour)
+            letter.GetTextProperty().SetJustificationToCentered()
+            letter.GetTextProperty().SetVerticalJustificationToCentered()
+            letter.GetPositionCoordinate().SetCoordinateSystemToViewport()
+            renderer.AddViewProp(letter)
+
+    def update(self, scale: float) -> None:
+        """As the renderer's camera stands."""
+        camera = self._renderer.GetActiveCamera()
+        matrix = camera.GetViewTransformMatrix()
+        seen = np.array([[matrix.GetElement(row, axis) for row in (0, 1)] for axis in range(3)])
+        middle = np.array([2.0, 2.0]) * LENGTH * scale
+        points = np.zeros((6, 3))
+        points[::2, :2], points[1::2, :2] = middle, middle + LENGTH * scale * seen
+        self._lines.points = points
+        places = middle + (LENGTH + 9.0) * scale * seen
+        kept: list[np.ndarray] = []
+        for k in np.argsort(-np.linalg.norm(seen, axis=1)):
+            letter, at = self.letters[k], places[k]
+            free = all(np.linalg.norm(at - other) > ROOM * scale for other in (*kept, middle))
+            letter.SetVisibility(free)
+            letter.SetPosition(*at)
+            if free:
+                kept.append(at)
+
 
 LEAST_N, LEAST_MM = 0.5, 2.0
 """What the axes reach at least."""

@@ -1,4 +1,8 @@
-"""Guidance in the touch window: the servo's ticks are cut into segments, a ghost tip shows the suggestion.
+"""The ghost tip: where the suggested press begins, and how deep it goes.
+
+Whether a session traced an object's base: the tip went all around it along its foot, on the support.
+
+Guidance in the touch window: the servo's ticks are cut into segments, a ghost tip shows the suggestion.
 
 The person does as he likes: what was done counts. A segment ends where the tip has been in the air for a
 while; it is taken in by the session's worker, so that the picture never waits, and the recording so far is
@@ -7,17 +11,122 @@ written after it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pyvista
+from scipy.spatial import cKDTree
 
 from palpate.diagnosis.explore.explorer import Explorer, State, Suggestion
 from palpate.diagnosis.explore.segments import Segment
 from palpate.mechanics.model.model import Model
 from palpate.servo import Servo
-from palpate.window.ghost import Ghost
-from palpate.window.tracing import BaseTracing
-from palpate.window.worker import Worker
+from palpate.window.picture import arrow_matrix
+from palpate.window.worker import Worker, level
+
+
+@dataclass(frozen=True)
+class Ghost:
+    """Where the tip is to go: centre (3,) m at first touch, into (3,) unit, how deep, m."""
+
+    centre: np.ndarray
+    into: np.ndarray
+    depth_m: float
+
+
+COLOUR = "#1a9850"
+STAFF_M = 0.03
+"""Of the staff along which the tip comes."""
+
+
+class GhostTip:
+    """On a plotter's first picture; `show` moves it."""
+
+    def __init__(self, plotter: pyvista.Plotter, tip_radius_m: float) -> None:
+        plotter.subplot(0, 0)
+        ball = pyvista.Sphere(radius=tip_radius_m, theta_resolution=20, phi_resolution=20)
+        self._tips = [plotter.add_mesh(ball.copy(), color=COLOUR, opacity=o) for o in (0.55, 0.25)]
+        staff = pyvista.Arrow(start=(-1, 0, 0), tip_length=0.25, tip_radius=0.09, shaft_radius=0.03)
+        self._staff = plotter.add_mesh(staff, color=COLOUR, opacity=0.7)
+        self._radius = tip_radius_m
+        self.show(None)
+
+    def show(self, ghost: Ghost | None) -> None:
+        """There, or nowhere."""
+        for actor in (*self._tips, self._staff):
+            actor.SetVisibility(ghost is not None)
+        if ghost is None:
+            return
+        self._tips[0].SetPosition(*ghost.centre)
+        self._tips[1].SetPosition(*(ghost.centre + ghost.depth_m * ghost.into))
+        start = ghost.centre - self._radius * ghost.into
+        self._staff.SetUserMatrix(arrow_matrix(start, ghost.into, STAFF_M))
+
+
+SECTORS = 72
+ENOUGH = 0.95
+NEAR_M = 0.002
+_SPACING_M = 0.0005
+
+
+class BaseTracing:
+    """Counts the directions, seen from the base's middle, in which the tip stood at the foot on the support.
+
+    first, last: numbers of the first and the last tip that counted, None before there is one; later ones
+    than those that closed the way around do not count.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        base = model.mesh.points[model.mesh.fixed]
+        self._middle = base.mean(axis=0)
+        up = model.support.normal
+        self._axes = np.column_stack([level(up), np.cross(up, level(up))])
+        self._foot = cKDTree((_outline(model) - self._middle) @ self._axes)
+        self._seen = np.zeros(SECTORS, dtype=bool)
+        self.first: int | None = None
+        self.last: int | None = None
+
+    def add(self, tips_m: np.ndarray, numbers: np.ndarray) -> None:
+        """(n, 3) m, centres of the tip, and (n,) what each is counted by."""
+        if self.done or not len(tips_m):
+            return
+        model = self._model
+        height = model.support.height(tips_m)
+        low = np.flatnonzero(height < model.tool.tip_radius_m)
+        away = (tips_m[low] - self._middle) @ self._axes
+        near = self._foot.query(away)[0] < model.tool.tip_radius_m + NEAR_M if len(low) else low
+        at_foot, away = low[near], away[near]
+        if not len(at_foot):
+            return
+        sector = (np.arctan2(away[:, 1], away[:, 0]) / (2 * np.pi) * SECTORS).astype(int) % SECTORS
+        self._seen[sector] = True
+        self.first = int(numbers[at_foot[0]]) if self.first is None else self.first
+        self.last = int(numbers[at_foot[-1]])
+
+    @property
+    def share(self) -> float:
+        """Of the way around, 0 to 1."""
+        return float(self._seen.mean())
+
+    @property
+    def done(self) -> bool:
+        """Enough to reconstruct the base from."""
+        return self.share >= ENOUGH
+
+
+def _outline(model: Model) -> np.ndarray:
+    """(k, 3) m, points close to one another along the rim of the base."""
+    triangles = model.mesh.surface[:, :3]
+    base = triangles[model.mesh.fixed[triangles].all(axis=1)]
+    edges = np.sort(np.concatenate([base[:, [0, 1]], base[:, [1, 2]], base[:, [2, 0]]]), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    ends = model.mesh.points[unique[count == 1]]
+    steps = max(2, int(np.ceil(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max() / _SPACING_M)))
+    share = np.linspace(0.0, 1.0, steps)[:, None, None]
+    return ((1.0 - share) * ends[:, 0] + share * ends[:, 1]).reshape(-1, 3)
+
 
 TOUCHING_N = 0.02
 """Force from which the tip touches something."""

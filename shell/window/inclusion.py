@@ -21,8 +21,8 @@ from palpate.mechanics.disk.scratch import memory_folder, temporary_prefix
 from palpate.mechanics.effects.hold import base_hold
 from palpate.mechanics.elastic import inclusion
 from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.model.material import balls_ratio
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.model.moduli import balls_ratio
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import closest
 from palpate.render.base import Renderer

@@ -15,8 +15,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from palpate.scenes.phantoms import Region
 from palpate.window.game import Game
-from palpate.window.keys import KEYS
-from palpate.window.orbit import Orbit
+from palpate.window.keys import KEYS, Orbit
 from palpate.window.pointer import Pointer
 from palpate.window.session import MODULUS_STEP, TouchSession
 from palpate.window.widgets import Board

@@ -11,12 +11,12 @@ import numpy as np
 
 from palpate.render.registry import names
 from palpate.scenes.scene import Scene
-from palpate.window.frames import Frame
 from palpate.window.keys import KEYS, help_rows, shown
 from palpate.window.mouse_and_keys import Controlled, Controls
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
 from palpate.window.session import FRICTIONS, MODULUS_STEP
 from palpate.window.widgets import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
+from palpate.window.worker import Frame
 
 T = TypeVar("T")
 WARNING = "#b3261e"

@@ -16,11 +16,11 @@ from palpate.render.press import BESIDE
 from palpate.render.support import support_plane
 from palpate.scenes.phantoms import Region
 from palpate.window import shadow
-from palpate.window.frames import Frame, View
 from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
 from palpate.window.widgets import INK
+from palpate.window.worker import Frame, View
 
 ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02

@@ -31,13 +31,11 @@ from palpate.render.scene import scene_of
 from palpate.scenes.phantoms import Region
 from palpate.servo import Servo, ServoOptions, ServoReport, ServoSnapshot
 from palpate.servo.started import StartedServo
-from palpate.window.frames import Frame, View
+from palpate.window.charts import Trace
 from palpate.window.inclusion import InclusionMover
-from palpate.window.last_seconds import Trace
 from palpate.window.recording import SessionRecording
-from palpate.window.second_renderer import Beside
-from palpate.window.window_renderers import DrawnRenderers
-from palpate.window.worker import Worker
+from palpate.window.window_renderers import Beside, DrawnRenderers
+from palpate.window.worker import Frame, View, Worker
 
 BESIDE = "hunt-crossley"
 """The second renderer where nobody said which."""

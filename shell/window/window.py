@@ -20,20 +20,18 @@ from palpate.devices.channel import PoseChannel
 from palpate.mechanics.disk.writing import PNG, atomic_file
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene
-from palpate.window.axes import Axes
-from palpate.window.charts import LiveCharts
-from palpate.window.frames import Frame, View, level
+from palpate.window.charts import Axes, LiveCharts
 from palpate.window.game import Game
-from palpate.window.ghost import GhostTip
+from palpate.window.guide import GhostTip
+from palpate.window.keys import Orbit
 from palpate.window.mouse_and_keys import Controls
-from palpate.window.orbit import Orbit
-from palpate.window.pace import Pace
 from palpate.window.panel import NextStep, aside_rows, main_rows
 from palpate.window.picture import ObjectPicture
 from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
 from palpate.window.widgets import PAPER, Board, Item
+from palpate.window.worker import Frame, Pace, View, level
 
 if TYPE_CHECKING:
     from palpate.window.guide import Guide

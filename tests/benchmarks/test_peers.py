@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks._peers import PEERS, ByHand, PointLoad, lines_of
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 E, NU, RADIUS = 30e3, 0.45, 0.005
 DEPTHS = np.array([0.0005, 0.001, 0.002])

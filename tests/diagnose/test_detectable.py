@@ -8,8 +8,7 @@ import pytest
 from palpate.diagnosis.forward.prediction import build_forward
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
-from palpate.diagnosis.search.detectable import SEEN, detectable
-from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.evidence import SEEN, Search, detectable
 from palpate.diagnosis.search.fit import settings_of
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.model import Model

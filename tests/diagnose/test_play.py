@@ -10,9 +10,8 @@ from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.instrument.instrument_effects import seen_play
 from palpate.diagnosis.instrument.support_readings import Rigid
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
-from palpate.diagnosis.search.attribution import Attribution, attribute
+from palpate.diagnosis.search.attribution import Attribution, attribute, fewer
 from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.fewer import fewer
 from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.effects.base import Effect

@@ -12,7 +12,6 @@ from palpate.diagnosis.numerics.contact_stiffness import layer_factors
 from palpate.diagnosis.numerics.lost_contact import lost
 from palpate.diagnosis.numerics.registry import NAMES, numericals
 from palpate.diagnosis.options import DiagnoseOptions
-from palpate.diagnosis.other_simulator.advice import parameter_words
 from palpate.diagnosis.other_simulator.against_law import seen_in_samples
 from palpate.diagnosis.other_simulator.forces import (
     Forces,
@@ -20,11 +19,11 @@ from palpate.diagnosis.other_simulator.forces import (
     aligned,
     read_forces,
     sorted_forces,
+    spread_out,
 )
 from palpate.diagnosis.other_simulator.parts import Parameter
 from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
-from palpate.diagnosis.other_simulator.presses_to_run import spread_out
-from palpate.diagnosis.other_simulator.result import PARTS, Mended
+from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
 from palpate.diagnosis.other_simulator.stated import StatedForward, stated_of
 from palpate.diagnosis.pipeline import diagnose
 from palpate.mechanics.contact.dent import grid
@@ -34,7 +33,7 @@ from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import LEAD_S
 from palpate.mechanics.progress import silent
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.registry import create
 from palpate.render.replay import replay
 from palpate.show.other_simulator import lead

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from palpate.diagnosis.verdict import corrections as module
-from palpate.diagnosis.verdict.corrections import (
+from palpate.diagnosis.verdict import conclusion as module
+from palpate.diagnosis.verdict.conclusion import (
     ALONE,
     BOTH,
     CANDIDATE,

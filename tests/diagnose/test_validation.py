@@ -13,7 +13,7 @@ from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.descent import Descent, fit
 from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.intervals import covariance, parameter_intervals
+from palpate.diagnosis.search.fit import covariance, parameter_intervals
 from palpate.diagnosis.search.leave_one_out import Candidate, held_out
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.site_stiffness import repeat_scatter

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.diagnosis.verdict import corrections
-from palpate.diagnosis.verdict.corrections import factors, widened
+from palpate.diagnosis.verdict import conclusion as corrections
+from palpate.diagnosis.verdict.conclusion import factors, widened
 from tools.diagnose_widening import chosen_factors, distances
 
 

@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 
 
 @pytest.fixture(scope="session")
 def box() -> Callable[..., TetMesh]:
-    """The factory mechanics.shape.box_mesh.box_mesh(cells, size, grade)."""
+    """The factory mechanics.shape.tetmesh.box_mesh(cells, size, grade)."""
     return box_mesh

@@ -24,7 +24,7 @@ HALF_SPACE = (1 - 0.49**2) / (2 * np.sqrt(np.pi) * 0.004)
 @pytest.fixture(scope="module")
 def block() -> TetMesh:
     """A block whose shape is known, standing on its fixed base."""
-    from palpate.mechanics.shape.box_mesh import box_mesh
+    from palpate.mechanics.shape.tetmesh import box_mesh
 
     mesh = box_mesh((8, 8, 4), SIZE_M)
     shell = trimesh.creation.box(SIZE_M)

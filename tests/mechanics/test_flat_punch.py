@@ -8,8 +8,7 @@ from scipy.optimize import brentq
 
 from palpate.mechanics.elastic.elasticity import stiffness
 from palpate.mechanics.elastic.pardiso import Pardiso, available
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 
 from .closed_forms import boussinesq_displacement, flat_punch_force
 

@@ -11,7 +11,7 @@ from palpate.mechanics.elastic.inclusion import Region
 from palpate.mechanics.elastic.pardiso import available
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import MeshError
-from palpate.mechanics.model.moduli import inclusion_ratio, share_inside
+from palpate.mechanics.model.material import inclusion_ratio, share_inside
 
 from ..support.nodule import AxisPress, felt
 

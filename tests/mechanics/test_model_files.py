@@ -7,9 +7,16 @@ import pytest
 
 from palpate.mechanics.errors import FileError, MeshError, ModelError
 from palpate.mechanics.model.files import read_model, write_model
-from palpate.mechanics.model.material import Ball, Gradient, Material, Skin
+from palpate.mechanics.model.material import (
+    MODULUS_LIMITS,
+    Ball,
+    Gradient,
+    Material,
+    Skin,
+    inclusion_ratio,
+    skin_ratio,
+)
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.model.moduli import MODULUS_LIMITS, inclusion_ratio, skin_ratio
 from palpate.mechanics.presses.making import of_places
 from palpate.mechanics.shape.tetmesh import TetMesh
 

@@ -8,8 +8,7 @@ import pytest
 from palpate.mechanics.compliance.near_field import contact_width, sharpening
 from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
 from palpate.mechanics.elastic.solver import Solver
-from palpate.mechanics.model.material import Ball
-from palpate.mechanics.model.moduli import balls_ratio, inclusion_ratio, mixed_ratio
+from palpate.mechanics.model.material import Ball, balls_ratio, inclusion_ratio, mixed_ratio
 from palpate.mechanics.shape.refine import refined_around, refined_near_surface
 
 NU = 0.49

@@ -5,13 +5,11 @@ import pytest
 
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.press_solver import settling
-from palpate.mechanics.press_solver.curved_faces import FeltSurface
-from palpate.mechanics.press_solver.even_surface import even_surface
-from palpate.mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
+from palpate.mechanics.press_solver import equilibrium as settling
+from palpate.mechanics.press_solver.graded_mesh import FeltSurface, drawn_to, even_surface, graded_mesh
 from palpate.mechanics.press_solver.press import PressOptions, PressSolver
 from palpate.mechanics.press_solver.solid import Solid
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 RADIUS_M, HEIGHT_M = 5e-3, 0.3
 TOP, UP = np.array([0.0, 0.0, HEIGHT_M]), np.array([0.0, 0.0, 1.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from palpate.mechanics.robust import biweight, spread, spread_about_zero, tukey
+from palpate.mechanics.statistics import biweight, spread, spread_about_zero, tukey
 
 
 def test_scales_are_those_of_gaussian_values_whatever_a_tenth_of_them_does() -> None:

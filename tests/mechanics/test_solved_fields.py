@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.mechanics.compliance import solved_fields
+from palpate.mechanics.compliance import field_response as solved_fields
+from palpate.mechanics.compliance.field_response import APART, far_in_field, solve_field
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.pressed_places import Places
 from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
-from palpate.mechanics.compliance.solved_fields import APART, far_in_field, solve_field
 from palpate.mechanics.frames import local_frames
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 UP, NU = np.array([0.0, 0.0, 1.0]), 0.49
 AT_M = (0.018, 0.024, 0.033, 0.042)

@@ -10,7 +10,7 @@ from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.press_solver import solved_places
 from palpate.mechanics.press_solver.solved_places import Touched, felt_of, said_beforehand, solve_touched
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 E, NU, TIP = 20e3, 0.49, 0.005
 UP = np.array([0.0, 0.0, 1.0])

@@ -17,8 +17,8 @@ from pyvista import examples
 
 from palpate.mechanics.disk.surface_files import UNITS, ClosedSurface, read_surface
 from palpate.mechanics.errors import SurfaceError
-from palpate.mechanics.shape.box_mesh import box_mesh
 from palpate.mechanics.shape.flat_foot import PointFoot, standing
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 SIZE_MM = (60, 50, 40)
 

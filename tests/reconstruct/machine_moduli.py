@@ -9,9 +9,9 @@ from scipy.optimize import brentq
 
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import ContactError, RecordingError
-from palpate.mechanics.robust import spread_about_zero
-from palpate.reconstruction.machine_curves.compression import Compression
+from palpate.mechanics.statistics import spread_about_zero
 from palpate.reconstruction.machine_curves.indentation import Indentation
+from palpate.reconstruction.machine_curves.uniaxial import Compression
 
 
 def small_strain_modulus(test: Compression, *, low: float = 0.0, high: float = 0.05) -> float:

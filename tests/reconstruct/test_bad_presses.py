@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.recording.recording import Recording
-from palpate.reconstruction.geometry.in_device_frame import nowhere
-from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.reconstruction.geometry.stated import GeometryOptions, nowhere
 from palpate.reconstruction.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions
 from palpate.reconstruction.steps.s3_contacts.left_out import off_surface

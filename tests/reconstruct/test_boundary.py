@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.errors import ContactError
-from palpate.reconstruction.shapes.points import farthest_points, fit_plane, in_its_plane
-from palpate.reconstruction.steps.s2_base.boundary import BoundaryOptions, find_boundary
-from palpate.reconstruction.steps.s2_base.tracing_interval import find_interval
+from palpate.reconstruction.shapes.outline import farthest_points, fit_plane, in_its_plane
+from palpate.reconstruction.steps.s2_base import BoundaryOptions, find_boundary, find_interval
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
 from .exploration_of_cylinder import RADIUS, TILTED, explore_cylinder

@@ -16,7 +16,7 @@ from palpate.mechanics.errors import ContactError, OptionError, RecordingError
 from palpate.mechanics.recording.calibration import Calibration, read_calibration
 from palpate.mechanics.recording.recording import read_recording, write_recording
 from palpate.mechanics.recording.segments import delayed
-from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.geometry.stated import nowhere
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.scenes.embedded import embedded_recording
 

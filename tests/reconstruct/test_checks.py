@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.errors import PalpateError, RecordingError
-from palpate.reconstruction.checks.finding import Finding, decades_of_tail
-from palpate.reconstruction.checks.outcome import Outcome, outcome
+from palpate.reconstruction.checks.finding import Finding, Outcome, decades_of_tail, outcome
 from palpate.reconstruction.checks.registry import Checkup, check, checked_samples, widened
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.units import measured

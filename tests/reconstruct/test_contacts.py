@@ -9,7 +9,7 @@ import pytest
 from palpate.mechanics.errors import ContactError, OptionError
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import Segment
-from palpate.reconstruction.steps.s1_filter.low_pass import low_pass
+from palpate.reconstruction.steps.s1_filter.noise import low_pass
 from palpate.reconstruction.steps.s1_filter.tool_weight import tool_weight
 from palpate.reconstruction.steps.s3_contacts import single_press
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
@@ -262,7 +262,7 @@ def test_a_soft_object_pressed_shallowly_keeps_its_presses():
 
 def test_a_foot_traced_in_straight_pieces_with_a_bounce_is_one_phase():
     """One straight side alone tells no plane, and a bounce of 20 ms ends no tracing."""
-    from palpate.reconstruction.steps.s2_base.tracing_interval import find_interval
+    from palpate.reconstruction.steps.s2_base import find_interval
 
     rate, rng = 1000, np.random.default_rng(5)
     corners = np.array([[0, 0], [0.06, 0], [0.06, 0.06], [0, 0.06], [0, 0]])

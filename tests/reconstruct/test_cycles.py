@@ -13,11 +13,10 @@ from palpate.diagnosis.pipeline import with_tip_of
 from palpate.mechanics.errors import ContactError, OptionError
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
+from palpate.reconstruction.geometry.stated import nowhere
 from palpate.reconstruction.presses_on_model import presses_on
-from palpate.reconstruction.steps.s1_filter.low_pass import low_pass, noise_gain
+from palpate.reconstruction.steps.s1_filter.noise import low_pass, noise_gain
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 from palpate.reconstruction.steps.s3_contacts.cycles import free_air_seen
 from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points

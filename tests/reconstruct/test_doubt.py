@@ -12,9 +12,8 @@ import trimesh
 from palpate import cli
 from palpate.mechanics.model.files import read_model
 from palpate.mechanics.recording.recording import write_recording
-from palpate.reconstruction.geometry.in_device_frame import nowhere
 from palpate.reconstruction.geometry.known_shape import place
-from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.reconstruction.geometry.stated import GeometryOptions, nowhere
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s7_modulus.held_out import held_out, modulus_by_others
 from palpate.reconstruction.steps.s7_modulus.modulus import fit_modulus

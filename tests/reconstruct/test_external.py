@@ -8,9 +8,9 @@ import pytest
 from benchmarks._machine_curves import Elastomer, Held, fit_elastomer, fit_holds, hold_error
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import ContactError, RecordingError
-from palpate.reconstruction.machine_curves.compression import Compression, read_compression
 from palpate.reconstruction.machine_curves.indentation import read_chiaro
 from palpate.reconstruction.machine_curves.relaxation import fit_relaxation
+from palpate.reconstruction.machine_curves.uniaxial import Compression, read_compression
 
 from .machine_moduli import fit_approach, small_strain_modulus
 

@@ -14,12 +14,10 @@ from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.shape.refine import refined_near_surface, typical_edge
 from palpate.operations._declare import Call
 from palpate.operations._shared import given_model
-from palpate.reconstruction.geometry.in_device_frame import nowhere
 from palpate.reconstruction.geometry.known_shape import place
 from palpate.reconstruction.geometry.slab import flat_mesh
-from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
-from palpate.reconstruction.shapes.evidence import Evidence
-from palpate.reconstruction.shapes.fit import Seen
+from palpate.reconstruction.geometry.stated import GeometryOptions, nowhere, stated_geometry
+from palpate.reconstruction.shapes.fit import Evidence, Seen
 from palpate.reconstruction.shapes.implicit import implicit_held_out
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.left_out import without_slides

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.errors import OptionError
-from palpate.reconstruction.steps.s1_filter.low_pass import low_pass, noise_gain, white_noise_std
+from palpate.reconstruction.steps.s1_filter.noise import low_pass, noise_gain, white_noise_std
 
 
 def test_a_symmetric_pulse_stays_symmetric_and_in_place():

@@ -12,7 +12,7 @@ from palpate import cli
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.specimen.approach import approach_of
 from palpate.diagnosis.specimen.bench import Curve, Similarity, bench_of
-from palpate.diagnosis.specimen.rivals import held_out_rivals
+from palpate.diagnosis.specimen.bench_diagnosis import held_out_rivals
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import ContactError, OptionError, RecordingError
 from palpate.reconstruction.machine_curves.relaxation import held_out_relaxation

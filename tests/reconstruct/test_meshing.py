@@ -12,8 +12,8 @@ from scipy.spatial import Delaunay
 import palpate.reconstruction.steps.s5_mesh.meshing as meshing_module
 from benchmarks._surface_truth import phantom_truth, touch
 from palpate.mechanics.errors import MeshError, SurfaceError
-from palpate.reconstruction.shapes.coarse_drawing import balanced
-from palpate.reconstruction.steps.s4_surface.surface import Surface, SurfaceOptions, reconstruct_surface
+from palpate.reconstruction.shapes.drawing import balanced
+from palpate.reconstruction.steps.s4_surface import Surface, SurfaceOptions, reconstruct_surface
 from palpate.reconstruction.steps.s5_mesh.meshing import (
     MeshingOptions,
     _held,

@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from palpate.reconstruction.steps.s1_filter.low_pass import low_pass, low_pass_at
-from palpate.reconstruction.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
+from palpate.reconstruction.steps.s1_filter.noise import (
+    crowd_scale,
+    least_contrast,
+    low_pass,
+    low_pass_at,
+    moving_spread,
+)
 from palpate.reconstruction.steps.s1_filter.signals import hysteresis
 
 RATE, CUTOFF = 1000.0, 25.0

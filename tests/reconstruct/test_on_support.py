@@ -11,7 +11,7 @@ from palpate.mechanics.errors import ContactError
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import Segment
 from palpate.reconstruction.checks.support import support
-from palpate.reconstruction.geometry.in_device_frame import nowhere
+from palpate.reconstruction.geometry.stated import nowhere
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
 from palpate.reconstruction.steps.s3_contacts.left_out import on_base
 

@@ -5,7 +5,7 @@ import pytest
 
 from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.presses.table import Presses
-from palpate.reconstruction.steps.s6_one_d.one_d import fit_paper, fit_robust
+from palpate.reconstruction.steps.s6_one_d import fit_paper, fit_robust
 
 RATE = 800.0
 Profile = tuple[np.ndarray, np.ndarray, np.ndarray]

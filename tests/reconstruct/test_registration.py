@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from palpate.mechanics.compliance.sites import touch_sites, touch_solver
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import vertex_normals
+from palpate.mechanics.shape.tetmesh import box_mesh, vertex_normals
 from palpate.reconstruction.geometry.registration import Body, Registration, Touched, register
 from palpate.reconstruction.steps.s3_contacts.left_out import sliding
 from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError, compliance_covariance

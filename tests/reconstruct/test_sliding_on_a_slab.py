@@ -12,10 +12,8 @@ from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.reconstruction.geometry.in_device_frame import nowhere
-from palpate.reconstruction.geometry.stated import GeometryOptions
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
+from palpate.reconstruction.geometry.stated import GeometryOptions, nowhere
 from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.reconstruction.steps.s3_contacts.contacts import explore

@@ -12,8 +12,8 @@ import pytest
 from benchmarks._surface_truth import OWN, phantom_truth, touch
 from benchmarks.surface import deviation
 from palpate.mechanics.errors import SurfaceError
-from palpate.reconstruction.shapes.evidence import Evidence
-from palpate.reconstruction.steps.s4_surface.surface import SurfaceOptions, reconstruct_surface
+from palpate.reconstruction.shapes.fit import Evidence
+from palpate.reconstruction.steps.s4_surface import SurfaceOptions, reconstruct_surface
 
 from .exploration_of_cylinder import explore_cylinder
 
@@ -201,7 +201,7 @@ def test_touches_on_the_support_alone_are_refused():
 def test_the_labelled_recordings_meet_the_targets(shared_recordings, stem, name):
     from palpate.mechanics.recording.recording import read_recording
     from palpate.reconstruction.steps.s3_contacts.contacts import explore
-    from palpate.reconstruction.steps.s4_surface.surface import evidence_of
+    from palpate.reconstruction.steps.s4_surface import evidence_of
 
     recording = read_recording(shared_recordings / f"{stem}.toml")
     found = reconstruct_surface(evidence_of(explore(recording)))
@@ -215,7 +215,7 @@ def test_the_labelled_recordings_meet_the_targets(shared_recordings, stem, name)
 
 
 def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
-    from palpate.reconstruction.shapes.candidates import first_guesses
+    from palpate.reconstruction.shapes.choice import first_guesses
     from palpate.reconstruction.shapes.fit import Seen, fit
 
     evidence, _ = touch(phantom_truth("cylinder"), 2)
@@ -273,7 +273,7 @@ def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeyp
 
 def test_an_implicit_surface_that_is_open_is_no_rival(monkeypatch):
     """It was tried where no shape explains the touches, and its fault refused the recording."""
-    from palpate.reconstruction.steps.s4_surface import surface as module
+    from palpate.reconstruction.steps import s4_surface as module
 
     asked = []
 
@@ -289,7 +289,7 @@ def test_an_implicit_surface_that_is_open_is_no_rival(monkeypatch):
 
 def test_a_first_touch_known_by_far_less_well_than_the_others_places_no_surface():
     from palpate.reconstruction.steps.s3_contacts.contacts import explore
-    from palpate.reconstruction.steps.s4_surface.surface import evidence_of
+    from palpate.reconstruction.steps.s4_surface import evidence_of
 
     found = explore(explore_cylinder(noise=0.01)[0])
     error = found.presses.onset_error_m.copy()

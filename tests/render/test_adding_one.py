@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.model.one_d_laws import LAWS
-from palpate.render.one_d.renderer import OneDRenderer
+from palpate.render.one_d import OneDRenderer
 from palpate.render.press import Stroke, press
 from palpate.render.registry import RENDERERS, create, names
 

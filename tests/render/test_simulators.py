@@ -12,7 +12,7 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.progress import silent
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.options import DOCUMENTED, RenderOptions
 from palpate.render.press import Stroke, press
 from palpate.render.registry import create, names, simulator_names

@@ -118,7 +118,7 @@ def test_a_missing_part_of_the_program_itself_is_no_matter_of_installing(monkeyp
 def test_a_request_to_end_waits_until_a_library_is_loaded():
     import signal
 
-    from palpate.whole_imports import loaded_whole
+    from palpate.child import loaded_whole
 
     loaded = []
     before = signal.signal(signal.SIGINT, signal.default_int_handler)

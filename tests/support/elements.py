@@ -22,8 +22,7 @@ from palpate.mechanics.elastic.elasticity import LOCAL_BULK, lame_parameters
 from palpate.mechanics.elastic.pardiso import Pardiso, available
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.shape.box_mesh import box_mesh
-from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 
 KINDS = {
     "linear": (1, LOCAL_BULK),

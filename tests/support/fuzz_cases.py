@@ -16,7 +16,7 @@ from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.recording.recording import read_recording, write_recording
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.scenes.embedded import embedded_names, embedded_recording
 
 from .device_bytes import MESSAGES

@@ -12,7 +12,7 @@ from scipy.spatial.distance import cdist
 
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import runs
-from palpate.reconstruction.shapes.points import in_its_plane
+from palpate.reconstruction.shapes.outline import in_its_plane
 from palpate.reconstruction.steps.s1_filter.fast_drift import (
     crowd_median,
     follow_free_air,
@@ -20,8 +20,14 @@ from palpate.reconstruction.steps.s1_filter.fast_drift import (
     passing,
     slow_part,
 )
-from palpate.reconstruction.steps.s1_filter.low_pass import low_pass_at, noise_gain, white_noise_std
-from palpate.reconstruction.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
+from palpate.reconstruction.steps.s1_filter.noise import (
+    crowd_scale,
+    least_contrast,
+    low_pass_at,
+    moving_spread,
+    noise_gain,
+    white_noise_std,
+)
 from palpate.reconstruction.steps.s1_filter.tool_weight import ToolWeight, tool_weight
 
 _LOW = 0.7
@@ -77,7 +83,7 @@ class Filtered:
 
     @cached_property
     def least(self) -> float:
-        """How many spreads a touch must reach (reconstruct.steps.s1_filter.noise_level)."""
+        """How many spreads a touch must reach (reconstruct.steps.s1_filter.noise)."""
         return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
 
     @cached_property

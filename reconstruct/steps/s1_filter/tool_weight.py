@@ -16,8 +16,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.spatial.transform import Rotation
 
 from palpate.mechanics.recording.recording import Recording
-from palpate.reconstruction.steps.s1_filter.low_pass import low_pass_at
-from palpate.reconstruction.steps.s1_filter.noise_level import crowd_scale
+from palpate.reconstruction.steps.s1_filter.noise import crowd_scale, low_pass_at
 
 _SUBSAMPLE = 1200
 _TRIALS = 200

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from palpate.mechanics.robust import spread
+from palpate.mechanics.statistics import spread
 
 _LEAST_COMPLIANCE = 1e-12
 _NEWTON_STEPS = 8

@@ -17,15 +17,15 @@ from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
 from palpate.mechanics.presses.repeats import SITE_M
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
-from palpate.reconstruction.shapes.evidence import LEAST_TOUCHES
-from palpate.reconstruction.steps.s1_filter.low_pass import (
+from palpate.reconstruction.shapes.fit import LEAST_TOUCHES
+from palpate.reconstruction.steps.s1_filter.noise import (
     FilterOptions,
     low_pass_at,
     noise_gain,
     white_noise_std,
 )
 from palpate.reconstruction.steps.s1_filter.signals import Signals, filtered_of
-from palpate.reconstruction.steps.s2_base.boundary import Boundary, BoundaryOptions
+from palpate.reconstruction.steps.s2_base import Boundary, BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.cycles import free_air_seen
 from palpate.reconstruction.steps.s3_contacts.first_touch import (
     ContactSpans,

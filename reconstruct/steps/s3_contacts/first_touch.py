@@ -16,8 +16,7 @@ from palpate.mechanics.errors import ContactError, LoudAirError
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import ON_SUPPORT, Segment, runs
 from palpate.reconstruction.steps.s1_filter.signals import Filtered, Signals, stated_tracing
-from palpate.reconstruction.steps.s2_base.boundary import Boundary, BoundaryOptions, find_boundary
-from palpate.reconstruction.steps.s2_base.tracing_interval import find_interval
+from palpate.reconstruction.steps.s2_base import Boundary, BoundaryOptions, find_boundary, find_interval
 from palpate.reconstruction.steps.s3_contacts.cycles import Piece, cycles, found_cycles
 from palpate.reconstruction.steps.s3_contacts.force_delay import Delay, delay_by_places
 from palpate.reconstruction.steps.s3_contacts.on_support import on_it, recognised, stated

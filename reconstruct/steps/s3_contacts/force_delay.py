@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.mechanics.robust import biweight, spread_about_zero
+from palpate.mechanics.statistics import biweight, spread_about_zero
 from palpate.reconstruction.steps.s1_filter.signals import Signals
 from palpate.reconstruction.steps.s3_contacts.contact_law import fit_rise
 from palpate.reconstruction.steps.s3_contacts.single_press import Touch

@@ -14,8 +14,8 @@ import numpy as np
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.segments import Segment
-from palpate.mechanics.robust import spread_about_zero
-from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.mechanics.statistics import spread_about_zero
+from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contact_law import contact_law, fit_offset, fit_rise
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 from palpate.reconstruction.steps.s3_contacts.on_support import on_it

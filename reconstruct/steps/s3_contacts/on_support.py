@@ -10,7 +10,7 @@ from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import ON_SUPPORT
 from palpate.reconstruction.steps.s1_filter.signals import Signals
-from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.reconstruction.steps.s2_base import Boundary
 
 _SLID = 2.0
 """Tip radii: what stays within is pressed, what goes farther slides."""

@@ -20,8 +20,8 @@ from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
 from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.robust import spread_about_zero
-from palpate.reconstruction.steps.s2_base.boundary import Boundary
+from palpate.mechanics.statistics import spread_about_zero
+from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contact_law import Loading, first_touches
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, Exploration
 

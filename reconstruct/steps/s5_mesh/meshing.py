@@ -14,7 +14,7 @@ from palpate.mechanics.options import option
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import closest, distance, sample
 from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
-from palpate.reconstruction.steps.s4_surface.surface import Surface
+from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
 from palpate.reconstruction.steps.s5_mesh.voxels import voxel_surface
 

@@ -12,7 +12,7 @@ from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.one_d_laws import LAWS, RIVALS, Fits, Law, forces_of, spread_law
 from palpate.mechanics.presses.table import Presses
-from palpate.reconstruction.steps.s6_one_d.one_d import columns, fit_robust, low_passed
+from palpate.reconstruction.steps.s6_one_d import columns, fit_robust, low_passed
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, combine
 from palpate.reconstruction.steps.s7_modulus.press_fit import touched_as_fitted
 

@@ -21,7 +21,7 @@ from palpate.mechanics.contact.depth_factors import DepthFactors
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import EXACT, option
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.robust import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
+from palpate.mechanics.statistics import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
 from palpate.reconstruction.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
 LAWS = ("linear", "neo-hookean", "sphere", "hertz")

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from palpate.mechanics.compliance.field_response import shares_of, tips_of
+from palpate.mechanics.compliance.field_response import far_in_field, shares_of, tips_of
 from palpate.mechanics.compliance.pressed_places import Places, places_at
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.compliance.smooth_field import (
@@ -28,7 +28,6 @@ from palpate.mechanics.compliance.smooth_field import (
     places_of,
     views_of,
 )
-from palpate.mechanics.compliance.solved_fields import far_in_field
 from palpate.mechanics.contact.edges import edge_law
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.effects import stiffness_field
@@ -174,7 +173,7 @@ class FieldSites:
 
 def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> FieldSites:
     """The sites as they are with a field, solved with it in the elements or beside one that was
-    (mechanics.compliance.solved_fields); None: of one modulus."""
+    (mechanics.compliance.field_response); None: of one modulus."""
     if field is None:
         return FieldSites(sites, np.ones(len(sites)))
     mesh = places.model.mesh

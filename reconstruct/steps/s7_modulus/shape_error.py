@@ -18,8 +18,8 @@ from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.elastic.elasticity import barycentric_gradients, lame_parameters, shape_derivatives
 from palpate.mechanics.elastic.solver import Solver
-from palpate.mechanics.gaussian import squared_exponential
 from palpate.mechanics.shape.tetmesh import FACES, TetMesh, lone_faces
+from palpate.mechanics.statistics import squared_exponential
 
 CORRELATION_M = 0.025
 _BATCH, _ROWS = 16, 512

@@ -10,8 +10,14 @@ from typing import Any
 import numpy as np
 
 from palpate.devices.codecs import spacemouse
-from palpate.exporting.page.packed import Block, modes_of
-from palpate.exporting.page.tables import depths_of, greatest_depth, responses, straight_forces
+from palpate.exporting.page.tables import (
+    Block,
+    depths_of,
+    greatest_depth,
+    modes_of,
+    responses,
+    straight_forces,
+)
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.model import Model

@@ -1,8 +1,12 @@
-"""The page as one HTML file: template, styles and scripts beside this file, and the contents of one model."""
+"""The page as one HTML file: template, styles and scripts beside this file, and the contents of one model.
+
+The button "press it" of a report: it opens the page of the report's object, which the report carries.
+"""
 
 from __future__ import annotations
 
 import base64
+import gzip
 import html
 import io
 import json
@@ -21,7 +25,7 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.press import Stroke, press
 from palpate.render.scene import TouchScene, in_the_air
-from palpate.show.object3d import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
+from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
 
 SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
@@ -180,3 +184,21 @@ def _peak(model: Model, i: int) -> float:
 
 def _number(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else "–"
+
+
+def button(model: Model) -> str:
+    """HTML of the button. Where the object's compliance is not kept in its folder yet, which takes a while to
+    compute, the button says by which command the page is made instead."""
+    if not _at_hand(model):
+        folder = html.escape(str(model.path or "MODEL"))
+        return (
+            '<details class="press-it"><summary>press it</summary><p>A page in which this object '
+            "can be pressed, by mouse, finger or keyboard, in any browser: "
+            f"<code>palpate export {folder} --to page -o touch.html</code></p></details>"
+        )
+    page = gzip.compress(page_of(FemRenderer(model)).encode(), 9, mtime=0)
+    return file("button.html").replace("{{page}}", base64.b64encode(page).decode()).rstrip("\n")
+
+
+def _at_hand(model: Model) -> bool:
+    return model.path is not None and any(model.path.glob("compliance-*.bin"))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.batching.run import Batch
+from palpate.batching.plan import Batch
 from palpate.batching.steps import MODEL
 from palpate.mechanics.model.files import read_model
 from palpate.show.batch.page import draw_agreement, lead, next_steps, report, verdict_words

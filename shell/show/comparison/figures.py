@@ -10,12 +10,11 @@ from palpate.diagnosis.compare.comparison import Comparison
 from palpate.diagnosis.compare.models import HOMOGENEOUS, RIVALS, stiffness_along
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.show.bars import draw_errors, height_of
-from palpate.show.model_view import facing, local, usual_colourings, view_of_presses
-from palpate.show.object3d import Colours, draw_object, spread_over
+from palpate.show.model import facing, local, usual_colourings, view_of_presses
 from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR
-from palpate.show.view3d import View
-from palpate.show.view3d_parts import Colouring, Line
+from palpate.show.scenery import Colours, draw_object, spread_over
+from palpate.show.view3d import Colouring, Line, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -26,12 +26,11 @@ from palpate.show.diagnosis.gaps import (
     worst_press,
 )
 from palpate.show.diagnosis.words import spoken
-from palpate.show.model_view import facing, usual_colourings, view_of_presses
-from palpate.show.object3d import Colours, draw_object, view_axes
+from palpate.show.model import facing, usual_colourings, view_of_presses
 from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR, MODULUS
-from palpate.show.view3d import View
-from palpate.show.view3d_parts import Colouring, Line
+from palpate.show.scenery import Colours, draw_object, view_axes
+from palpate.show.view3d import Colouring, Line, View
 
 MEASURED, IDEAL, IMPROVED, RIVAL = "#1d3557", "#e76f51", "#2a9d8f", "#e9b44c"
 

@@ -14,7 +14,7 @@ from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
-from palpate.show.object3d import spread_over
+from palpate.show.scenery import spread_over
 
 MOST_EFFECTS = 8
 MOST_SHOWN = 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.reconstruction.pipeline import Reconstruction
-from palpate.reconstruction.steps.s6_one_d.one_d import low_passed
+from palpate.reconstruction.steps.s6_one_d import low_passed
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.show.reconstruction.modulus import height_trends
 

@@ -10,12 +10,12 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.model.model import Model
 from palpate.reconstruction.pipeline import Reconstruction
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
-from palpate.reconstruction.steps.s6_one_d.one_d import profiles
+from palpate.reconstruction.steps.s6_one_d import profiles
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import nearest_nodes
 from palpate.render.surface.felt_surface import felt_surface
-from palpate.show.object3d import draw_object, view_axes
 from palpate.show.page import subplots
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR, TOUCH_COLOUR
+from palpate.show.scenery import draw_object, view_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

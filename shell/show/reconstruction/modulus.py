@@ -12,11 +12,11 @@ from scipy.stats import pearsonr, spearmanr
 from palpate.mechanics.model.model import Model
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.render.surface.felt_surface import felt_surface
-from palpate.show.object3d import Colours, draw_object
 from palpate.show.page import subplots
 from palpate.show.quantities import KELVIN_VOIGT, MODULUS, Quantity
 from palpate.show.reconstruction.exploration import spread
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR
+from palpate.show.scenery import Colours, draw_object
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,10 +11,9 @@ import numpy as np
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.model.model import Model
 from palpate.reconstruction.pipeline import Reconstruction
-from palpate.reconstruction.steps.s4_surface.surface import Surface
-from palpate.reconstruction.steps.s6_one_d.one_d import low_passed
-from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
-from palpate.show.object3d import Colours, draw_object, draw_touched
+from palpate.reconstruction.steps.s4_surface import Surface
+from palpate.reconstruction.steps.s6_one_d import low_passed
+from palpate.show.model import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import ERROR, MODULUS, softness
 from palpate.show.reconstruction.differences import differences, trend_words
@@ -36,8 +35,8 @@ from palpate.show.reconstruction.tables import (
     table_one,
     trends_table,
 )
-from palpate.show.view3d import View
-from palpate.show.view3d_parts import Colouring, Line
+from palpate.show.scenery import Colours, draw_object, draw_touched
+from palpate.show.view3d import Colouring, Line, View
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

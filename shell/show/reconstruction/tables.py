@@ -13,7 +13,7 @@ from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.shape.refine import refined_near_surface, typical_edge
 from palpate.reconstruction.pipeline import Reconstruction
-from palpate.reconstruction.steps.s6_one_d.one_d import OneD, fit_paper, fit_robust, profiles
+from palpate.reconstruction.steps.s6_one_d import OneD, fit_paper, fit_robust, profiles
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import nearest_nodes
 from palpate.show.diagnosis.words import chance_words
 from palpate.show.page import Page

@@ -13,7 +13,7 @@ from palpate.diagnosis.compare.before_after import Side, changes
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.making import of_places
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -10,7 +10,7 @@ import pytest
 from benchmarks._tissue import tissue
 from palpate.diagnosis.compare.comparison import Along, CompareOptions, compare_presses
 from palpate.diagnosis.compare.models import HOMOGENEOUS, RIVALS, as_touched
-from palpate.mechanics.compliance import solved_fields
+from palpate.mechanics.compliance import field_response as solved_fields
 from palpate.mechanics.presses.making import PathErrors, of_paths
 from palpate.reconstruction.steps.s7_modulus.modulus_field import asked_for, fit_field
 from palpate.show.comparison import lines

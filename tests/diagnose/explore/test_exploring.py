@@ -14,7 +14,7 @@ from palpate.diagnosis.explore.explorer import Explorer
 from palpate.diagnosis.explore.goals import GoalOptions, GoalState, surface_error
 from palpate.diagnosis.explore.segments import Instrument, Segment, join
 from palpate.mechanics.errors import OptionError, RecordingError
-from palpate.robot.protocol import segment_of, serve
+from palpate.robot import segment_of, serve
 
 from ...reconstruct.exploration_of_cylinder import explore_cylinder
 

@@ -9,7 +9,7 @@ import pytest
 from palpate.diagnosis.explore.causes import NONE, causes_of
 from palpate.diagnosis.explore.explorer import Explorer
 from palpate.diagnosis.explore.goals import GoalOptions
-from palpate.diagnosis.search.starts import REACH_M
+from palpate.diagnosis.search.descent import REACH_M
 from palpate.mechanics.recording.recording import read_recording
 
 

@@ -15,7 +15,8 @@ import pytest
 
 import palpate as pp
 from palpate import cli
-from palpate.batching import run, steps
+from palpate.batching import plan as run
+from palpate.batching import steps
 from palpate.batching.plan import Choice, find, tasks_of
 from palpate.batching.summary import COLUMNS, Row, agreement
 
@@ -272,7 +273,7 @@ def test_values_of_options_are_read_as_toml_and_else_as_words(tmp_path, quick, m
         seen.update(choice=choice)
         return whole(sources, out, choice, **more)
 
-    monkeypatch.setattr("palpate.batching.run.find", lambda *given: [])
+    monkeypatch.setattr("palpate.batching.plan.find", lambda *given: [])
     monkeypatch.setattr(run, "batch", watched)
     given = ["diagnose.fast=true", "diagnose.without=adhesion", "reconstruct.mesh_size_m=0.008"]
     cli.main(["batch", ".", "-o", str(tmp_path / "o"), *(w for v in given for w in ("--set", v))])

@@ -20,7 +20,7 @@ from palpate.mechanics.disk.surface_files import read_surface
 from palpate.mechanics.model.files import write_model
 from palpate.mechanics.model.material import Ball, Material
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.simulators.mujoco import force_on_tip
 
 SIZE = (0.06, 0.05, 0.03)

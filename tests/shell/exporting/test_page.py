@@ -14,9 +14,9 @@ import pytest
 
 import palpate as pp
 from palpate.devices.codecs import spacemouse
-from palpate.exporting.page.button import button
 from palpate.exporting.page.contents import force_band, shown_modes
-from palpate.exporting.page.packed import modes_of
+from palpate.exporting.page.document import button
+from palpate.exporting.page.tables import modes_of
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model

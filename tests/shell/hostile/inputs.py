@@ -13,7 +13,7 @@ import numpy as np
 from palpate import cli
 from palpate.mechanics.model.material import Ball, Material, Skin
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.shape.box_mesh import box_mesh
+from palpate.mechanics.shape.tetmesh import box_mesh
 
 HEADER = "t,x,y,z,fx,fy,fz"
 DESCRIPTION = """[recording]

@@ -36,7 +36,7 @@ ROBOT = {
 def test_a_robots_hostile_line_is_answered_in_one_and_nothing_of_it_kept(name):
     from palpate.diagnosis.explore.explorer import Explorer
     from palpate.diagnosis.explore.segments import Instrument
-    from palpate.robot.protocol import serve
+    from palpate.robot import serve
 
     line, words = ROBOT[name]
     explorer, said = Explorer(Instrument(0.005)), []
@@ -46,7 +46,7 @@ def test_a_robots_hostile_line_is_answered_in_one_and_nothing_of_it_kept(name):
 
 def test_a_robot_that_misses_the_object_feels_its_way_to_the_nearest_place(monkeypatch):
     """With what the program itself installs: another library was asked for."""
-    from palpate.robot.laboratory import LaboratoryRobot
+    from palpate.robot import LaboratoryRobot
     from palpate.scenes.phantoms import phantom
 
     monkeypatch.setitem(sys.modules, "rtree", None)

@@ -7,7 +7,7 @@ import pytest
 
 from palpate.devices.intention import FreeExploration
 from palpate.devices.virtual_hand import SimulatedHand
-from palpate.servo.work_on_hand import HeldForce
+from palpate.servo.device_thread import HeldForce
 
 PUSH = np.array([0.0, 0.0, 2.0])
 

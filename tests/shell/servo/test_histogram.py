@@ -7,8 +7,8 @@ import threading
 import numpy as np
 
 from palpate.servo.histogram import BINS, Histogram, bin_of, count, lower_edge_ns
+from palpate.servo.layout import begin_write, read_copy, write_block
 from palpate.servo.report import ServoReport
-from palpate.servo.seqlock import begin_write, read_copy, write_block
 
 from ...support.waiting import eventually
 

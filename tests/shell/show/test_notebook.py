@@ -16,7 +16,7 @@ pytest.importorskip("ipykernel", reason="needs nbclient and ipykernel, which exe
 CELLS = (
     "import numpy as np\n"
     "import palpate as pp\n"
-    "from palpate.mechanics.shape.box_mesh import box_mesh\n"
+    "from palpate.mechanics.shape.tetmesh import box_mesh\n"
     "from palpate.mechanics.model.material import Material\n"
     "from palpate.mechanics.model.model import Model, Support, Tool\n"
     "support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))\n"

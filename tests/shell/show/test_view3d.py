@@ -11,11 +11,10 @@ import pytest
 import trimesh
 from matplotlib.figure import Figure
 
-from palpate.show.model_view import facing
+from palpate.show.model import facing
 from palpate.show.page import Page
 from palpate.show.quantities import DEPTH, ERROR, MODULUS, ORDER, UNCERTAINTY
-from palpate.show.view3d import View, scripts
-from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
+from palpate.show.view3d import Colouring, Line, Thing, Traces, View, scripts
 
 from . import browser
 
@@ -254,7 +253,7 @@ def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
 
     from palpate.mechanics.model.material import Material
     from palpate.mechanics.model.model import Model, Support, Tool
-    from palpate.mechanics.shape.box_mesh import box_mesh
+    from palpate.mechanics.shape.tetmesh import box_mesh
 
     class ZMQInteractiveShell:
         pass

@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from palpate.window.frames import Frame
 from palpate.window.guide import Guide
 from palpate.window.window import TouchWindow
+from palpate.window.worker import Frame
 
 from ...support.waiting import PATIENCE_S
 from .small import SIZE

@@ -7,7 +7,7 @@ import pytest
 
 import palpate as pp
 from palpate.render.scene import scene_of
-from palpate.window.second_renderer import Beside
+from palpate.window.window_renderers import Beside
 
 
 def test_many_ticks_at_once_are_felt_as_one_after_the_other(block):

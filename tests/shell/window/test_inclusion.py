@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from palpate.mechanics.model.material import balls_ratio
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.model.moduli import balls_ratio
 from palpate.render.base import Renderer
 from palpate.render.registry import create
 from palpate.scenes.phantoms import Region

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import vtk
 
-from palpate.window.orbit import FARTHEST, NEAREST, Orbit
+from palpate.window.keys import FARTHEST, NEAREST, Orbit
 
 MIDDLE = np.array([0.01, -0.02, 0.03])
 UP = np.array([0.0, 0.6, 0.8])

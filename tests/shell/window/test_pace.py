@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from palpate.window.pace import Pace
+from palpate.window.worker import Pace
 
 
 def drawn(pace: Pace, step_s: float, pictures: int, begin_s: float = 0.0) -> tuple[float, float]:

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.errors import SceneError
+from palpate.mechanics.model.material import balls_ratio
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.model.moduli import balls_ratio
 from palpate.scenes.build import keep, model_of
-from palpate.scenes.exploration import ExplorationOptions, base_tracing, explore
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import ball_of, load_scene, read_scene, scene_names
-from palpate.scenes.virtual_presses import spread_places
+from palpate.scenes.virtual_presses import ExplorationOptions, base_tracing, explore, spread_places
 
 from .small import block_mesh
 

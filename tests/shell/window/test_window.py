@@ -20,8 +20,7 @@ from palpate.mechanics.recording.recording import read_recording
 from palpate.operations.touch import Touched
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene, load_scene
-from palpate.window.axes import ROOM
-from palpate.window.charts import LEAST_MM, LEAST_N, LiveCharts
+from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
 from palpate.window.panel import DEPTH
 from palpate.window.picture import STIFFNESS

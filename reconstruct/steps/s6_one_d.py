@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from palpate.mechanics.presses.table import FITS, Presses
-from palpate.reconstruction.steps.s1_filter.low_pass import FilterOptions, low_pass
+from palpate.reconstruction.steps.s1_filter.noise import FilterOptions, low_pass
 
 EXPONENTS = (0.5, 3.0)
 _SAMPLES = 200

@@ -1,1 +1,0 @@
-"""The surface through base and first touches (section 2.2)."""
