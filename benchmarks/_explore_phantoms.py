@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.varied.draws import draw
 from benchmarks.varied.objects import Thing, thing
 from palpate.diagnosis.explore.causes import least_that_matters, projected
-from palpate.diagnosis.explore.estimate import Estimate, updated
+from palpate.diagnosis.explore.estimate import ExplorationEstimate, updated
 from palpate.diagnosis.explore.explorer import Suggestion
 from palpate.diagnosis.explore.segments import join
 from palpate.diagnosis.explore.weighing import Weighing, weigh
@@ -126,7 +126,7 @@ def limits_of(it: Sealed) -> dict[str, float]:
         to = Suggestion("press", "", 1e-3 * touch.point, touch.normal, depth, speed_m_per_s=0.02, hold_s=0.2)
         segments.append(robot.carry_out(to))
     recording = join(robot.instrument, segments)
-    weighing = weigh(updated(recording, Estimate(), robot.phantom.poisson_ratio, it.seed))
+    weighing = weigh(updated(recording, ExplorationEstimate(), robot.phantom.poisson_ratio, it.seed))
     return _detectable_n(weighing) if weighing else {}
 
 

@@ -24,7 +24,7 @@ from benchmarks._orders import ORDERS
 from benchmarks.evidence import wilson
 from benchmarks.timing import table
 from palpate.diagnosis.explore.causes import NONE
-from palpate.diagnosis.explore.explorer import Explorer, State
+from palpate.diagnosis.explore.explorer import ExplorationState, Explorer
 from palpate.diagnosis.explore.goals import GoalOptions
 from palpate.mechanics.disk.scratch import cache_folder
 from palpate.mechanics.disk.store import content_key
@@ -130,7 +130,9 @@ def explored(it: Sealed, order: str, goals: GoalOptions) -> dict[str, Any]:
     return row | {"steps": steps, "trouble": trouble, "cpu_s": time.process_time() - begin}
 
 
-def _step(explorer: Explorer, state: State, it: Sealed, robot: Any, update_s: float) -> dict[str, Any]:
+def _step(
+    explorer: Explorer, state: ExplorationState, it: Sealed, robot: Any, update_s: float
+) -> dict[str, Any]:
     """What was known after a touch, and what was true."""
     step: dict[str, Any] = {
         "made": state.made,

@@ -16,7 +16,7 @@ from benchmarks.timing import measure, table
 from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.compliance.sites import patch_width
 from palpate.mechanics.compliance.surface_compliance import patch_blocks
-from palpate.mechanics.elastic.inclusion import Region
+from palpate.mechanics.elastic.inclusion import StiffenedElements
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.model.material import inclusion_ratio, mixed_ratio, share_inside
 from palpate.mechanics.shape.tetmesh import box_mesh
@@ -41,7 +41,7 @@ def dragged(arguments: argparse.Namespace) -> dict[str, float]:
     plain = patch_blocks(Solver(mesh, NU), places, width).transpose(0, 2, 1, 3).reshape(3 * t, 3 * t)
     started = time.process_time()
     pool = np.flatnonzero(share_inside(mesh, middle, arguments.reach) > 0)
-    region = Region(Solver(mesh, NU), pool, PatchSampler(mesh, width).matrix(places))
+    region = StiffenedElements(Solver(mesh, NU), pool, PatchSampler(mesh, width).matrix(places))
     prepare = time.process_time() - started
 
     def move() -> np.ndarray:

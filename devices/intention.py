@@ -27,7 +27,7 @@ def minimum_jerk(fraction: float) -> float:
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 
-class Path:
+class HandPath:
     """Waypoints (n, 3) m at times (n,) s, reached with minimum-jerk strokes; rests at the last one.
 
     `even=True` goes along straight pieces at even speed instead, for paths sampled finely (a tracing, a

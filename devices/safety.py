@@ -140,7 +140,7 @@ class SafetyState(NamedTuple):
     workspace_centre: np.ndarray
 
 
-class Reading(NamedTuple):
+class RawPose(NamedTuple):
     """The device's newest raw state, as the filter needs it: (3,) arrays in the device frame, SI."""
 
     position: np.ndarray

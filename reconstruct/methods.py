@@ -15,7 +15,7 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import option
 from palpate.mechanics.press_solver.solved_places import (
     ExactPresses,
-    Touched,
+    PlacesToSolve,
     check_laws,
     deepest_of_sites,
     said_beforehand,
@@ -63,7 +63,7 @@ class ReconstructOptions:
 
 
 @dataclass(frozen=True)
-class Body:
+class BodyToFit:
     """What a modulus is fitted to. mesh: linear. presses: on the surface; curves: low-passed, in contact.
     say: is told how long takes what takes minutes."""
 
@@ -79,7 +79,7 @@ class Body:
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedPresses:
     """Touched places that were solved, and the modulus by the tabulated law, before."""
 
     presses: ExactPresses
@@ -87,7 +87,7 @@ class Solved:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class ModulusOnMesh:
     """The modulus, Pa, by one of the methods, and the mesh (linear or quadratic) that it holds on."""
 
     mesh: TetMesh
@@ -97,7 +97,7 @@ class Fitted:
     sites: TouchSites | None = None
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
-    solved: Solved | None = None
+    solved: SolvedPresses | None = None
 
     @property
     def dent_law(self) -> str:
@@ -116,7 +116,7 @@ class FiniteTip:
         self.options = options
         self.surface_options, self.meshing_options = options.surface, options.meshing
 
-    def fit(self, body: Body, progress: Progress, clock: Clock) -> Fitted:
+    def fit(self, body: BodyToFit, progress: Progress, clock: Clock) -> ModulusOnMesh:
         mesh, nu, placed = body.mesh.quadratic(), body.poisson_ratio, body.placed
         solver = touch_solver(body.mesh, nu)
         clock.lap("factorise")
@@ -140,19 +140,23 @@ class FiniteTip:
         fit, solved = fitted(), None
         if self.options.modulus.exact:
             clock.lap("modulus")
-            solved = Solved(_solve(body, mesh, sites, fit, part(progress, 0.8, 0.95)), fit)
+            solved = SolvedPresses(_solve(body, mesh, sites, fit, part(progress, 0.8, 0.95)), fit)
             clock.lap("solved places")
             fit = fitted(solved.presses.factors)
             sites = dataclasses.replace(sites, factors=solved.presses.factors[fit.press.law])
-        return Fitted(mesh, fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa, sites, fit, solved=solved)
+        return ModulusOnMesh(
+            mesh, fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa, sites, fit, solved=solved
+        )
 
 
-def _solve(body: Body, mesh: TetMesh, sites: TouchSites, fit: ModulusFit, progress: Progress) -> ExactPresses:
+def _solve(
+    body: BodyToFit, mesh: TetMesh, sites: TouchSites, fit: ModulusFit, progress: Progress
+) -> ExactPresses:
     """The touched places, by the laws of the dent that a fit with tabulated ones left open."""
     laws = [law for law, (_, _, share) in fit.by_law.items() if share > 0]
     presses = body.presses
     places = TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing)
-    touched = Touched(sites.points, presses.site, presses.deepest, places)
+    touched = PlacesToSolve(sites.points, presses.site, presses.deepest, places)
     places_to_solve = len(deepest_of_sites(touched.site, touched.deepest_m))
     body.say(f"--exact: {said_beforehand(places_to_solve, len(laws))}")
     return solve_touched(
@@ -178,12 +182,12 @@ class Paper:
         if options.meshing.mesh_source == "auto":
             self.meshing_options = dataclasses.replace(options.meshing, mesh_source="voxels")
 
-    def fit(self, body: Body, progress: Progress, clock: Clock) -> Fitted:
+    def fit(self, body: BodyToFit, progress: Progress, clock: Clock) -> ModulusOnMesh:
         progress("modulus", 0.6)
         fit = fit_paper_modulus(
             body.curves, body.mesh, body.poisson_ratio, self.options.paper, seed=self.options.seed
         )
-        return Fitted(body.mesh, fit.modulus_pa, fit.ci95_pa, fit.press_modulus_pa, paper_fit=fit)
+        return ModulusOnMesh(body.mesh, fit.modulus_pa, fit.ci95_pa, fit.press_modulus_pa, paper_fit=fit)
 
 
 Method = FiniteTip | Paper

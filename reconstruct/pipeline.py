@@ -24,7 +24,7 @@ from palpate.mechanics.recording.recording import Recording, base_model_of
 from palpate.mechanics.result import Result
 from palpate.reconstruction.background_mesher import BackgroundMesher
 from palpate.reconstruction.checks.finding import Finding, outcome_of
-from palpate.reconstruction.checks.registry import Checkup
+from palpate.reconstruction.checks.registry import CheckupRun
 from palpate.reconstruction.geometry.known_shape import place
 from palpate.reconstruction.geometry.stated import (
     GeometryOptions,
@@ -33,7 +33,7 @@ from palpate.reconstruction.geometry.stated import (
     nowhere,
     stated_geometry,
 )
-from palpate.reconstruction.methods import BY_NAME, Body, Fitted, Method, Solved
+from palpate.reconstruction.methods import BY_NAME, BodyToFit, Method, ModulusOnMesh, SolvedPresses
 from palpate.reconstruction.methods import ReconstructOptions as ReconstructOptions
 from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
@@ -50,7 +50,7 @@ from palpate.reconstruction.steps.s4_surface import (
 )
 from palpate.reconstruction.steps.s5_mesh.meshing import Meshing, uncertainty_at
 from palpate.reconstruction.steps.s6_one_d import OneD, columns, profiles
-from palpate.reconstruction.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
+from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors, held_out, modulus_by_others
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.reconstruction.steps.s7_modulus.modulus_field import with_fitted_field
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit
@@ -80,8 +80,8 @@ class Reconstruction(Result):
     paper_fit: PaperFit | None = None
     placed: Placed | None = None
     findings: tuple[Finding, ...] = ()
-    held_out: HeldOut | None = None
-    exact: Solved | None = None
+    held_out: HeldOutErrors | None = None
+    exact: SolvedPresses | None = None
 
     @property
     def doubt(self) -> str:
@@ -152,7 +152,7 @@ def _reconstructed(
     progress("contacts", 0.02)
     geometry = stated_geometry(recording, options.geometry)
     _check_points(recording, geometry, options)
-    checkup = Checkup(recording, options.force, not geometry.known, options.filter.cutoff_hz)
+    checkup = CheckupRun(recording, options.force, not geometry.known, options.filter.cutoff_hz)
     run = _Run(recording, method, checkup, mesher, clock)
     placed: Placed | None
     if geometry.known:
@@ -172,7 +172,7 @@ def _reconstructed(
     mesh = mesher.mesh(surface)
     clock.lap("mesh")
     progress("factorise", 0.5)
-    body = Body(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n, say)
+    body = BodyToFit(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n, say)
     fitted = method.fit(body, progress, clock)
     interval = checkup.interval(outcome_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
     clock.lap("modulus")
@@ -211,8 +211,8 @@ def _reconstructed(
 
 
 def _judged(
-    model: Model, fitted: Fitted, field: str, noise_n: float, clock: Clock
-) -> tuple[Model, HeldOut | None]:
+    model: Model, fitted: ModulusOnMesh, field: str, noise_n: float, clock: Clock
+) -> tuple[Model, HeldOutErrors | None]:
     """The model, with a field where that is wanted and its presses ask for one, and how it predicts places
     that were held out."""
     sites, modulus = fitted.sites, fitted.modulus
@@ -236,7 +236,7 @@ class _Run:
 
     recording: Recording
     method: Method
-    checkup: Checkup
+    checkup: CheckupRun
     mesher: BackgroundMesher
     clock: Clock
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from palpate.mechanics.effects.laws_along_path import PathNumbers, path_numbers
 from palpate.mechanics.effects.registry import effects
-from palpate.mechanics.effects.settings import STICKS, Touch
+from palpate.mechanics.effects.settings import STICKS, TouchTerms
 from palpate.mechanics.model.model import Model
 from palpate.render.options import RenderOptions
 
@@ -29,13 +29,13 @@ class EffectArrays(NamedTuple):
     dent_radius: np.ndarray
 
 
-def rendered_touch(model: Model, options: RenderOptions) -> Touch:
+def rendered_touch(model: Model, options: RenderOptions) -> TouchTerms:
     """What a tip feels: the material's dent, the effects that the model names, the options' law and friction.
 
     What is material stays where the options leave effects out. Raises ModelError where an effect's keys are
     missing or impossible.
     """
-    touch = Touch()
+    touch = TouchTerms()
     for effect in effects():
         if effect.of_material is not None:
             effect.of_material(touch, model)
@@ -50,6 +50,6 @@ def rendered_touch(model: Model, options: RenderOptions) -> Touch:
     return touch
 
 
-def effect_arrays(touch: Touch) -> EffectArrays:
+def effect_arrays(touch: TouchTerms) -> EffectArrays:
     """The kernel's numbers of a touch."""
     return EffectArrays(path_numbers(touch), np.array([touch.tip_ratio]))

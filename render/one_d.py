@@ -18,7 +18,7 @@ import numpy as np
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.kernels import inner, step_kernel
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.model.one_d_laws import LAWS, Law, spread_law
+from palpate.mechanics.model.one_d_laws import LAWS, OneDLaws, spread_law
 from palpate.mechanics.progress import Progress, silent
 from palpate.render.base import Grip, Renderer, check_radii, new_grip, new_state
 from palpate.render.options import RenderOptions
@@ -156,7 +156,7 @@ class OneDRenderer(Renderer):
 
     kernel = staticmethod(one_d_step)
 
-    def __init__(self, name: str, model: Model, law: Law, options: RenderOptions) -> None:
+    def __init__(self, name: str, model: Model, law: OneDLaws, options: RenderOptions) -> None:
         self.name = name
         self.model = model
         self.options = options

@@ -26,7 +26,7 @@ from typing import Any
 
 from palpate.devices.mapper import MapperOptions, axis_matrix
 from palpate.mechanics.disk.reading import named_in, read_toml
-from palpate.mechanics.disk.schema import Key, Listed, Schema, check_table
+from palpate.mechanics.disk.schema import FileKey, Listed, Schema, check_table
 from palpate.mechanics.disk.surface_files import SUFFIXES, is_surface_file
 from palpate.mechanics.errors import OptionError, SceneError
 from palpate.mechanics.model.material import BALL, Ball
@@ -40,36 +40,36 @@ COLOURS = ("displacement", "stiffness")
 OBJECT_KINDS = ("phantom", "mesh", "model", "recording")
 _OPTIONAL_TIP = replace(TIP_RADIUS, required=False)
 SCHEMA: Schema = {
-    "title": Key(str),
-    "about": Key(str),
-    "find": Key(bool),
+    "title": FileKey(str),
+    "about": FileKey(str),
+    "find": FileKey(bool),
     "object": {
-        "phantom": Key(str),
-        "mesh": Key(str),
-        "model": Key(str),
-        "recording": Key(str),
+        "phantom": FileKey(str),
+        "mesh": FileKey(str),
+        "model": FileKey(str),
+        "recording": FileKey(str),
         "young_modulus_pa": replace(YOUNG_MODULUS, required=False),
         "poisson_ratio": POISSON_RATIO,
-        "mesh_size_m": Key(low=5e-4, high=0.2, unit="m"),
-        "finite_strain": Key(bool),
-        "unit": Key(str),
-        "up": Key(str),
-        "sink_m": Key(low=0.0, high=0.1, unit="m"),
+        "mesh_size_m": FileKey(low=5e-4, high=0.2, unit="m"),
+        "finite_strain": FileKey(bool),
+        "unit": FileKey(str),
+        "up": FileKey(str),
+        "sink_m": FileKey(low=0.0, high=0.1, unit="m"),
     },
-    "inclusion": Listed({**BALL, "name": Key(str)}),
+    "inclusion": Listed({**BALL, "name": FileKey(str)}),
     "tool": {"tip_radius_m": _OPTIONAL_TIP},
     "device": {
-        "axes": Key(str),
-        "motion_scale": Key(low=1e-3, high=1e3),
-        "force_scale": Key(low=0.0, high=100.0),
-        "clutch_button": Key(int, low=-1, high=63),
-        "reach_m": Key(low=1e-3, high=1.0, unit="m"),
+        "axes": FileKey(str),
+        "motion_scale": FileKey(low=1e-3, high=1e3),
+        "force_scale": FileKey(low=0.0, high=100.0),
+        "clutch_button": FileKey(int, low=-1, high=63),
+        "reach_m": FileKey(low=1e-3, high=1.0, unit="m"),
     },
     "render": {
-        "renderer": Key(str),
-        "beside": Key(str),
-        "colour": Key(str, choices=COLOURS),
-        "friction": Key(low=0.0, high=100.0),
+        "renderer": FileKey(str),
+        "beside": FileKey(str),
+        "colour": FileKey(str, choices=COLOURS),
+        "friction": FileKey(low=0.0, high=100.0),
     },
 }
 """What a scene's file may hold."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.devices.intention import Path
+from palpate.devices.intention import HandPath
 from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.errors import SceneError
@@ -139,7 +139,7 @@ def explore(
     *,
     hand_stiffness_n_per_m: float = 600.0,
     seed: int = 0,
-) -> tuple[Path, float]:
+) -> tuple[HandPath, float]:
     """The hand's path and the time, s, at which the tracing ends (phase I).
 
     hand_stiffness_n_per_m: the hand means to go deeper by its own give under about 1 N.
@@ -171,7 +171,7 @@ def explore(
             _go(times, points, before, 1.5 * speed)
             _rest(times, points, 0.15)
         _go(times, points, _raised(model, before, high), options.travel_speed_m_per_s)
-    return Path(np.array(times), np.array(points), even=True), traced_s
+    return HandPath(np.array(times), np.array(points), even=True), traced_s
 
 
 def base_tracing(model: Model, options: ExplorationOptions) -> np.ndarray:

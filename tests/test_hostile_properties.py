@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks._servo_load import block_model
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.errors import DeviceError, ModelError, PalpateError, RecordingError, SceneError
 from palpate.mechanics.model.files import SCHEMA as OF_MODEL
 from palpate.mechanics.model.files import read_model, write_model
@@ -53,7 +53,7 @@ def places(schema, before=()):
     """Paths of keys that a schema knows, its tables too."""
     for key, form in schema.items():
         yield (*before, key)
-        if not isinstance(form, Key) and hasattr(form, "items"):
+        if not isinstance(form, FileKey) and hasattr(form, "items"):
             yield from places(form, (*before, key))
 
 

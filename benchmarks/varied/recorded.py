@@ -13,7 +13,7 @@ from benchmarks.varied.instrument import logged, weighed
 from benchmarks.varied.objects import Thing, thing
 from benchmarks.varied.writing import object_name, write
 from palpate.mechanics.recording.recording import Recording, read_recording
-from palpate.mechanics.recording.segments import Segment
+from palpate.mechanics.recording.segments import TimeSegment
 from palpate.scenes.laboratory.curves import ALONE, Solving
 from palpate.scenes.laboratory.hand import HandOptions, cohort_hand
 from palpate.scenes.laboratory.motion import Motion
@@ -102,12 +102,12 @@ def explored(
     return Varied(draw, it, recording, simulation)
 
 
-def _stated(way: Motion, draw: Draw) -> tuple[Segment, ...]:
+def _stated(way: Motion, draw: Draw) -> tuple[TimeSegment, ...]:
     """What is written down of what was done beside the presses."""
     if not draw.boundary_phase_stated:
         return ()
     return tuple(
-        Segment(kind, round(a + draw.clock_s, 2), round(b + draw.clock_s, 2)) for kind, a, b in way.beside
+        TimeSegment(kind, round(a + draw.clock_s, 2), round(b + draw.clock_s, 2)) for kind, a, b in way.beside
     )
 
 

@@ -19,7 +19,7 @@ _WIDEST_BITS, _LONGEST_BITS = 64, 8 * 4096
 
 
 @dataclass(frozen=True)
-class Field:
+class ReportField:
     """`count` values of `size` bits from bit `bit` of a report (its id byte not counted).
 
     array: a value is the number of one of `usages`, counted from logical_min; else value i has usage i (the
@@ -70,7 +70,7 @@ class Field:
 class Descriptor:
     """fields in order; report_bits: (kind, id) -> bits; numbered: reports start with their id."""
 
-    fields: tuple[Field, ...]
+    fields: tuple[ReportField, ...]
     report_bits: dict[tuple[str, int], int]
     numbered: bool
 
@@ -78,7 +78,7 @@ class Descriptor:
         """Length without the id byte."""
         return (self.report_bits.get((kind, report_id), 0) + 7) // 8
 
-    def find(self, kind: Kind, inside: int | None, usage: int) -> Field | None:
+    def find(self, kind: Kind, inside: int | None, usage: int) -> ReportField | None:
         """The first field of a kind, inside a collection, that has a usage or lies in a collection of it."""
         for candidate in self.fields:
             if candidate.kind != kind or (inside is not None and inside not in candidate.path):
@@ -113,7 +113,7 @@ def parse(descriptor: bytes) -> Descriptor:
     state, local = _Globals(), _Locals()
     stack: list[_Globals] = []
     path: list[int] = []
-    fields: list[Field] = []
+    fields: list[ReportField] = []
     bits: dict[tuple[str, int], int] = {}
     position, numbered = 0, False
     while position < len(descriptor):
@@ -179,8 +179,10 @@ def _local_item(local: _Locals, page: int, tag: int, value: int, length: int) ->
         local.low = None
 
 
-def _field(kind: Kind, state: _Globals, local: _Locals, flags: int, bit: int, path: tuple[int, ...]) -> Field:
-    return Field(
+def _field(
+    kind: Kind, state: _Globals, local: _Locals, flags: int, bit: int, path: tuple[int, ...]
+) -> ReportField:
+    return ReportField(
         kind,
         state.report_id,
         bit,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from palpate.devices.codecs.hid_descriptor import Descriptor, Field, Kind, parse
+from palpate.devices.codecs.hid_descriptor import Descriptor, Kind, ReportField, parse
 from palpate.mechanics.errors import DeviceError
 
 PAGE = 0x000F0000
@@ -37,7 +37,7 @@ _BUTTONS = 256
 
 
 @dataclass(frozen=True)
-class Axes:
+class StickReading:
     """x, y: -1 to 1 over the axis' logical range (None where the device lacks it); buttons: a mask."""
 
     x: float | None = None
@@ -100,7 +100,7 @@ class PidLayout:
             raise DeviceError("this device's descriptor lacks a selection that constant forces need")
         return (group, 1, index)
 
-    def _find(self, kind: Kind, inside: int, usage: int) -> Field:
+    def _find(self, kind: Kind, inside: int, usage: int) -> ReportField:
         place = self.descriptor.find(kind, inside, usage)
         if place is None:
             raise DeviceError(f"this device's descriptor declares no usage 0x{usage:x} in 0x{inside:x}")
@@ -189,13 +189,13 @@ class PidLayout:
         ]
         return 1 + max(lengths, default=0)
 
-    def axes(self, report: bytes) -> Axes | None:
+    def axes(self, report: bytes) -> StickReading | None:
         """Positions and buttons from an input report; None where it is of another kind."""
         report_id, body = self._split(report)
         x, y = (self._axis(report_id, body, usage) for usage in (X, Y))
         if x is None and y is None:
             return None
-        return Axes(x, y, self._buttons(report_id, body))
+        return StickReading(x, y, self._buttons(report_id, body))
 
     def fault(self, report: bytes) -> str | None:
         """What a PID state report complains about, '' if nothing; None where it is another report."""

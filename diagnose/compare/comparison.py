@@ -71,7 +71,7 @@ class RegionResult:
     rmse_n: N. bias: share by which the predicted force is too large (-0.5: half as stiff as the object).
     """
 
-    region: Region
+    region: HeldOutRegion
     rmse_n: dict[str, float]
     relative_rmse: dict[str, float]
     bias: dict[str, float]
@@ -262,7 +262,7 @@ def verdict(result: Comparison) -> str:
 
 
 @dataclass(frozen=True)
-class Region:
+class HeldOutRegion:
     """name: as in the report. words: what it is. members: (p,) bool, the presses inside."""
 
     name: str
@@ -270,7 +270,7 @@ class Region:
     members: np.ndarray
 
 
-def regions(model: Model, points: np.ndarray, normals: np.ndarray) -> list[Region]:
+def regions(model: Model, points: np.ndarray, normals: np.ndarray) -> list[HeldOutRegion]:
     """The regions of an object that hold enough presses; points, normals: (p, 3) of the presses.
 
     top: faces up (within 40 degrees of the support's normal). top-centre: its inner part, so that the data
@@ -295,10 +295,12 @@ def regions(model: Model, points: np.ndarray, normals: np.ndarray) -> list[Regio
     if len(top):
         centre[top] = out[top] < min(0.55 * inscribed, np.quantile(out[top], 0.5) + 1e-6)
     found = [
-        Region("top-centre", "the inner part of the top; seen: the rest, towards the rim", centre),
-        Region("top", "the whole top; seen: the side", faces_up),
-        Region("base-band", "the lowest 35 % of the side; seen: what is above", ~faces_up & (h < 0.35)),
-        Region(
+        HeldOutRegion("top-centre", "the inner part of the top; seen: the rest, towards the rim", centre),
+        HeldOutRegion("top", "the whole top; seen: the side", faces_up),
+        HeldOutRegion(
+            "base-band", "the lowest 35 % of the side; seen: what is above", ~faces_up & (h < 0.35)
+        ),
+        HeldOutRegion(
             "corners", "beyond the largest circle in the outline; seen: what is inside", out > 1.1 * inscribed
         ),
     ]

@@ -24,7 +24,7 @@ from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.model.one_d_laws import LAWS as ONE_D_LAWS
 from palpate.mechanics.model.one_d_laws import RIVALS as RIVALS
-from palpate.mechanics.model.one_d_laws import Law, forces_of, spread_law
+from palpate.mechanics.model.one_d_laws import OneDLaws, forces_of, spread_law
 from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.presses.table import MARGIN_S, Presses
@@ -61,7 +61,7 @@ class Prepared:
 
     presses: Presses
     unit: dict[str, np.ndarray]
-    laws: dict[str, Law]
+    laws: dict[str, OneDLaws]
     sites: TouchSites
     places: Places
     own: dict[str, PressModuli]
@@ -181,7 +181,7 @@ def predicted(
         HOMOGENEOUS: partial(plain.at(test).forces, presses),
     }
     for name, fitted in prepared.laws.items():
-        own = Law(*(column[train] for column in fitted))
+        own = OneDLaws(*(column[train] for column in fitted))
         at = spread_law(whole.point[train], whole.site[train], own, whole.point[test], interpolation)
         models[name] = partial(forces_of, at, presses)
     return {name: as_touched(models[name], presses, first_touch) for name in MODELS}, fem
@@ -242,7 +242,7 @@ def stiffness_along(
         result[name] = (deepest * solved.normals).sum(axis=1)
     presses = prepared.presses
     for name, fitted in prepared.laws.items():
-        own = Law(*(c[train] for c in fitted))
+        own = OneDLaws(*(c[train] for c in fitted))
         at = spread_law(presses.point[train], presses.site[train], own, places)
         result[name] = at.k * depth_m**at.r
     return result

@@ -140,7 +140,7 @@ class ReachOptions:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class TouchCandidate:
     """A touch that could be made: surface point (3,), outward unit normal (3,), depth m, seconds it takes,
     worth a second, and which goal gains most; how it is pressed, and which causes that would separate."""
 
@@ -192,7 +192,7 @@ class Known:
     tip_radius_m: float
 
 
-def ranked(known: Known, reach: ReachOptions, separations: Sequence[Separation] = ()) -> list[Candidate]:
+def ranked(known: Known, reach: ReachOptions, separations: Sequence[Separation] = ()) -> list[TouchCandidate]:
     """All touches, the best first. separations: what each way of pressing would show of causes, at the places
     pressed so far."""
     surface = known.surface
@@ -225,7 +225,7 @@ def ranked(known: Known, reach: ReachOptions, separations: Sequence[Separation] 
             )
             best = max(gains, key=lambda g: gains[g])
             made.append(
-                Candidate(
+                TouchCandidate(
                     point, normal, way.depth_m, seconds, sum(gains.values()) / seconds, best,
                     way.speed_m_per_s, way.hold_s, way.separation,
                 )

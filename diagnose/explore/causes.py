@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.diagnosis.explore.estimate import Estimate
+from palpate.diagnosis.explore.estimate import ExplorationEstimate
 from palpate.diagnosis.explore.weighing import Act, Weighing, weigh
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import AttributionOptions
@@ -100,7 +100,7 @@ def prior_of(names: Sequence[str]) -> np.ndarray:
     return np.array([0.5 if n == NONE else each for n in names])
 
 
-def causes_of(estimate: Estimate, least_n: float | None = None) -> tuple[Causes, Weighing] | None:
+def causes_of(estimate: ExplorationEstimate, least_n: float | None = None) -> tuple[Causes, Weighing] | None:
     """None with fewer presses than LEAST_PRESSES, or without a surface."""
     weighing = weigh(estimate)
     if weighing is None:

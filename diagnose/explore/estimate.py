@@ -53,7 +53,7 @@ _BOOTSTRAPS = 200
 
 
 @dataclass(frozen=True)
-class Solved:
+class SolvedMesh:
     """A mesh with its factorisation, the surface it fills, and what was solved on it by place: far fields,
     and how each answers to an error of the shape (`shape_error.shape_gradients`)."""
 
@@ -64,7 +64,7 @@ class Solved:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ExplorationEstimate:
     """What is known after the presses so far. surface, fit: None before LEAST_PRESSES were found.
 
     weight: of the tool. presses_placed: the table on the surface, a row of `sites` each.
@@ -76,7 +76,7 @@ class Estimate:
     exploration: Exploration | None = None
     weight: ToolWeight | None = None
     surface: Surface | None = None
-    solved: Solved | None = None
+    solved: SolvedMesh | None = None
     presses_placed: Presses | None = None
     sites: TouchSites | None = None
     fit: ModulusFit | None = None
@@ -108,12 +108,12 @@ class Estimate:
 
 def updated(
     recording: Recording,
-    before: Estimate,
+    before: ExplorationEstimate,
     poisson_ratio: float,
     seed: int = 0,
     *,
     within_m: float | None = None,
-) -> Estimate:
+) -> ExplorationEstimate:
     """The estimate with all that `recording` holds; `before`: of a beginning of it. within_m: as sure as the
     surface is asked for; one family of shapes may only seem that sure, so all are tried before it counts.
 
@@ -138,7 +138,7 @@ def updated(
     covariance = compliance_covariance(solved.solver, sites, deviation, gradient=gradient)
     fit = modulus_of(presses, sites, exploration.noise_n, covariance, seed)
     clock.lap("modulus")
-    return Estimate(
+    return ExplorationEstimate(
         exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, choice_error,
         clock.laps, covariance,
     )  # fmt: skip
@@ -153,7 +153,7 @@ def modulus_of(
 
 
 def _surface(
-    exploration: Exploration, before: Estimate, within_m: float | None
+    exploration: Exploration, before: ExplorationEstimate, within_m: float | None
 ) -> tuple[Surface, int, float]:
     """(surface, presses at the last choice of a family, m within which 95 % of the surface lay by that)."""
     count = len(exploration.presses)
@@ -176,18 +176,18 @@ def free_error(surface: Surface) -> float:
     return surface_error(surface.uncertainty_m[free], area)
 
 
-def _solved(surface: Surface, before: Estimate, poisson_ratio: float) -> Solved:
+def _solved(surface: Surface, before: ExplorationEstimate, poisson_ratio: float) -> SolvedMesh:
     kept = before.solved
     if kept is not None:
         off = distance(kept.surface.vertices, kept.surface.triangles, surface.vertices)
         if np.percentile(off, 95) < max(_MOVED_M, _MOVED_SHARE * free_error(surface)):
             return kept
     mesh = mesh_surface(surface, MeshingOptions(mesh_size_m=MESH_M)).mesh
-    return Solved(surface, mesh, touch_solver(mesh, poisson_ratio, surface_edge_m=SURFACE_EDGE_M))
+    return SolvedMesh(surface, mesh, touch_solver(mesh, poisson_ratio, surface_edge_m=SURFACE_EDGE_M))
 
 
 def solved_sites(
-    solved: Solved, points: np.ndarray, normals: np.ndarray, poisson_ratio: float
+    solved: SolvedMesh, points: np.ndarray, normals: np.ndarray, poisson_ratio: float
 ) -> tuple[TouchSites, np.ndarray]:
     """(sites of surface points (k, 3) with outward normals (k, 3), their shape gradients (k, m)); what was
     solved on this mesh before is read."""

@@ -11,11 +11,11 @@ from scipy.spatial import cKDTree
 
 from palpate.diagnosis.explore.candidates import TOUCH_ERROR_M, ReachOptions
 from palpate.diagnosis.explore.causes import Causes, causes_of
-from palpate.diagnosis.explore.estimate import LEAST_PRESSES, Estimate, updated
+from palpate.diagnosis.explore.estimate import LEAST_PRESSES, ExplorationEstimate, updated
 from palpate.diagnosis.explore.goals import GoalOptions, GoalState
 from palpate.diagnosis.explore.modulus import modulus_beside
 from palpate.diagnosis.explore.segments import Instrument, Segment, check_joined, join, split
-from palpate.diagnosis.explore.state import State, cause_goal
+from palpate.diagnosis.explore.state import ExplorationState, cause_goal
 from palpate.diagnosis.explore.suggestion import Explored, Situation, Step, Suggestion, suggest
 from palpate.diagnosis.explore.weighing import Weighing
 from palpate.mechanics.errors import (
@@ -67,7 +67,7 @@ class Explorer:
         self.segments: list[Segment] = []
         self._nu, self._seed = poisson_ratio, seed
         self._order, self._rng = order, np.random.default_rng([seed, 61])
-        self._estimate = Estimate()
+        self._estimate = ExplorationEstimate()
         self._base: Boundary | None = None
         self._heights = np.zeros(0)
         self._trouble, self._air_hides = "", False
@@ -104,7 +104,7 @@ class Explorer:
         return join(self.instrument, self.segments)
 
     @property
-    def estimate(self) -> Estimate:
+    def estimate(self) -> ExplorationEstimate:
         """Shape, sites and modulus behind `state`."""
         return self._estimate
 
@@ -112,7 +112,7 @@ class Explorer:
         """Write what was felt so far; an earlier file stays whole until the new one is. Returns its path."""
         return write_recording(path, self.recording)
 
-    def add(self, segment: Segment) -> State:
+    def add(self, segment: Segment) -> ExplorationState:
         """Take what was felt in, and bring the estimate up to date.
 
         A press that cannot be used is kept in the recording and named in `state.trouble`.
@@ -140,7 +140,7 @@ class Explorer:
         self._steps.append(Step(self._last, self.state))
         self._last = None  # it is done, and what comes next depends on what it told
 
-    def _tested(self, before: Estimate) -> None:
+    def _tested(self, before: ExplorationEstimate) -> None:
         """Each new touch tests the surface as it was: by how many of its standard deviations it was off."""
         if before.surface is None or before.exploration is None or self._estimate.exploration is None:
             return
@@ -184,7 +184,7 @@ class Explorer:
         self._heights = found.boundary.height(found.presses.point) if len(found.presses) else np.zeros(0)
 
     @property
-    def state(self) -> State:
+    def state(self) -> ExplorationState:
         """What is known now."""
         e = self._estimate
         nan = float("nan")
@@ -203,7 +203,7 @@ class Explorer:
         causes = self._causes[0] if self._causes else None
         if self.goals.cause_at is not None:
             goals.append(cause_goal(causes, self.goals.cause_at))
-        return State(
+        return ExplorationState(
             presses=e.presses,
             made=self._made,
             seconds=sum(s.seconds for s in self.segments),

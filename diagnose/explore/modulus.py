@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from palpate.diagnosis.explore.causes import NONE, Causes
-from palpate.diagnosis.explore.estimate import Estimate, modulus_of
+from palpate.diagnosis.explore.estimate import ExplorationEstimate, modulus_of
 from palpate.diagnosis.explore.weighing import Weighing
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.search.descent import fit
@@ -33,7 +33,7 @@ SAME_S = 1e-6
 
 
 def modulus_beside(
-    estimate: Estimate, weighing: Weighing, causes: Causes, seed: int = 0
+    estimate: ExplorationEstimate, weighing: Weighing, causes: Causes, seed: int = 0
 ) -> tuple[float, tuple[float, float]]:
     """(Pa, 95 % interval) of the modulus over the likeliest hypotheses."""
     assert estimate.fit is not None
@@ -68,7 +68,9 @@ def _by(made: ModulusFit) -> tuple[float, float]:
     return float(np.log(made.modulus_pa)), log_sd(made.ci95_pa)
 
 
-def _beside(estimate: Estimate, w: Weighing, causes: Causes, name: str, seed: int) -> tuple[float, float]:
+def _beside(
+    estimate: ExplorationEstimate, w: Weighing, causes: Causes, name: str, seed: int
+) -> tuple[float, float]:
     """(log modulus, its standard deviation) of the presses with one cause taken off."""
     e = estimate
     assert e.presses_placed is not None and e.sites is not None

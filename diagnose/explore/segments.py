@@ -10,7 +10,7 @@ import numpy as np
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import STATED
-from palpate.mechanics.recording.segments import Segment as Stretch
+from palpate.mechanics.recording.segments import TimeSegment as Stretch
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 
 AIR_S = 0.3

@@ -12,7 +12,7 @@ from palpate.diagnosis.explore.goals import GoalState
 
 
 @dataclass(frozen=True)
-class State:
+class ExplorationState:
     """What is known. modulus_pa, interval: nan where nothing is known, beside causes where those are asked
     for. goals: how far each is.
 

@@ -13,19 +13,19 @@ import numpy as np
 
 from palpate.diagnosis.explore.candidates import (
     RIGID_S,
-    Candidate,
     Known,
     ReachOptions,
+    TouchCandidate,
     first_places,
     ranked,
     separations,
     support_gain,
 )
 from palpate.diagnosis.explore.causes import Causes, words
-from palpate.diagnosis.explore.estimate import LEAST_PRESSES, Estimate
+from palpate.diagnosis.explore.estimate import LEAST_PRESSES, ExplorationEstimate
 from palpate.diagnosis.explore.goals import GoalOptions
 from palpate.diagnosis.explore.modulus import log_sd
-from palpate.diagnosis.explore.state import State
+from palpate.diagnosis.explore.state import ExplorationState
 from palpate.diagnosis.explore.weighing import Weighing
 from palpate.mechanics.result import Result
 from palpate.reconstruction.steps.s2_base import Boundary
@@ -90,7 +90,7 @@ class Situation:
     of the next place; None goes where the progress is greatest.
     """
 
-    state: State
+    state: ExplorationState
     goals: GoalOptions
     reach: ReachOptions
     tip_radius_m: float
@@ -99,7 +99,7 @@ class Situation:
     base: Boundary | None
     heights: np.ndarray
     air_hides: bool
-    estimate: Estimate
+    estimate: ExplorationEstimate
     causes: tuple[Causes, Weighing] | None
     here: np.ndarray
     asked: np.ndarray
@@ -167,7 +167,7 @@ def _first(s: Situation, base: Boundary) -> Suggestion:
     )  # fmt: skip
 
 
-def _best(s: Situation) -> Candidate | None:
+def _best(s: Situation) -> TouchCandidate | None:
     e = s.estimate
     if e.surface is None or e.exploration is None or e.fit is None:
         return None
@@ -193,7 +193,7 @@ def _best(s: Situation) -> Candidate | None:
     return best[s.choose(np.array([c.point for c in best]), presses.point, presses.point[-1])]
 
 
-def _in_vain(s: Situation, best: Candidate) -> bool:
+def _in_vain(s: Situation, best: TouchCandidate) -> bool:
     """Whether only the cause is open, and all presses that are left would not settle it, by far."""
     open_ = [goal for goal in s.state.goals if not goal.met]
     if best.separation is None or [goal.name for goal in open_] != ["cause"]:
@@ -217,7 +217,7 @@ def _on_support(s: Situation, worth: float) -> Suggestion | None:
     )
 
 
-def _why(s: Situation, best: Candidate) -> str:
+def _why(s: Situation, best: TouchCandidate) -> str:
     goals = {goal.name: goal for goal in s.state.goals}
     if best.for_goal == "cause" and best.separation is not None:
         first, rival = words(best.separation.first), words(best.separation.rival)
@@ -244,7 +244,7 @@ class Step:
     known after it."""
 
     asked: Suggestion | None
-    state: State
+    state: ExplorationState
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -258,10 +258,10 @@ class Explored(Result):
 
     path: str
     steps: tuple[Step, ...]
-    state: State
+    state: ExplorationState
     last: Suggestion
     goals: GoalOptions
-    estimate: Estimate
+    estimate: ExplorationEstimate
     truth: Mapping[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:

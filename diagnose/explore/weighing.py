@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.diagnosis.explore.estimate import MESH_M, Estimate, solved_sites
+from palpate.diagnosis.explore.estimate import MESH_M, ExplorationEstimate, solved_sites
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.forward.touches import reached, touches_of, unobservable_effects
 from palpate.diagnosis.instrument.free_air import free_air_of
@@ -30,14 +30,14 @@ from palpate.mechanics.compliance.far_field import energy_fields
 from palpate.mechanics.compliance.pressed_places import places_at
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
-from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.effects.settings import ForwardSettings
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.statistics import squared_exponential
 from palpate.reconstruction.steps.s5_mesh.meshing import uncertainty_at
 
-Act = Callable[[Settings, Forward], None]
+Act = Callable[[ForwardSettings, Forward], None]
 """Sets one form of a cause in a prediction."""
 SHARES = (0.3, 1.0, 3.0)
 """Steps from where an effect does nothing, of its starts, at which its form is taken."""
@@ -107,7 +107,7 @@ def balls(forward: Forward) -> list[np.ndarray]:
 
 
 def softer(compliance: np.ndarray) -> Act:
-    def act(settings: Settings, scene: Forward) -> None:
+    def act(settings: ForwardSettings, scene: Forward) -> None:
         settings.far = settings.far.copy()
         settings.far[:, 0, 0] += compliance
 
@@ -161,7 +161,7 @@ class Weighing:
         return self.forward.touches.noise.variance_inflation * max(1.0, misfit)
 
 
-def weigh(estimate: Estimate) -> Weighing | None:
+def weigh(estimate: ExplorationEstimate) -> Weighing | None:
     """All columns of evidence at the present estimate."""
     scene = forward_of(estimate)
     if scene is None:
@@ -224,7 +224,7 @@ def _spring(forward: Forward, found: Fit, act: Act) -> float:
     return float(settings.tool_compliance)
 
 
-def _on_support(estimate: Estimate) -> tuple[float, float] | None:
+def _on_support(estimate: ExplorationEstimate) -> tuple[float, float] | None:
     """(m/N by which the tip yields against the rigid support, standard error), where that was touched."""
     exploration, surface = estimate.exploration, estimate.surface
     if exploration is None or surface is None:
@@ -248,7 +248,7 @@ def _size(change: np.ndarray, plain: np.ndarray) -> float:
     return float(np.sqrt((beyond**2).sum(axis=1).mean()))
 
 
-def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
+def forward_of(estimate: ExplorationEstimate) -> tuple[Forward, np.ndarray] | None:
     """(forward model of the presses so far, (p,) share by which each place's stiffness may be off); on the
     running estimate's own mesh and solved places. Presses that the running surface passes by more than a
     first touch can be moved are left out: they lie on a shape that is not there yet."""
@@ -270,7 +270,7 @@ def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
     return forward, site_stiffness_sd(forward, NUISANCE)
 
 
-def _model(e: Estimate, presses: Presses) -> Model:
+def _model(e: ExplorationEstimate, presses: Presses) -> Model:
     assert e.solved is not None and e.surface is not None and e.sites is not None and e.fit is not None
     mesh = e.solved.mesh.quadratic()
     return Model(
@@ -293,7 +293,7 @@ def common_errors(forward: Forward, found: Fit, before: np.ndarray, site_sd: np.
     sideways = before.copy()
     sideways[:, 0] = 0.0
 
-    def moved(change: Settings) -> np.ndarray:
+    def moved(change: ForwardSettings) -> np.ndarray:
         return np.nan_to_num(forward.predict(change)) - before
 
     settings = settings_of(forward, (), found.values, found.onset)

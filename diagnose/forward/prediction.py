@@ -19,10 +19,10 @@ from palpate.mechanics.compliance.pressed_places import Places, solve_places
 from palpate.mechanics.contact.dent import bend_of, effective_radius
 from palpate.mechanics.contact.touch import TouchedPlaces
 from palpate.mechanics.effects.laws_along_path import new_memory, path_numbers
-from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.effects.settings import ForwardSettings
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.press_solver.press import LAWS
-from palpate.mechanics.press_solver.solved_places import ExactPresses, Touched, solve_touched
+from palpate.mechanics.press_solver.solved_places import ExactPresses, PlacesToSolve, solve_touched
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.recording.kinematics import acceleration
@@ -108,10 +108,10 @@ class Forward:
         """(n, 4) tool to device, scalar first, where it is recorded."""
         return self.touches.quaternion
 
-    def ideal(self, modulus: float) -> Settings:
+    def ideal(self, modulus: float) -> ForwardSettings:
         """Settings of the ideal model."""
         p = len(self.touches)
-        return Settings(
+        return ForwardSettings(
             modulus=modulus,
             nu=self.model.material.poisson_ratio,
             far=self.places.far,
@@ -121,7 +121,7 @@ class Forward:
             stiffness=np.ones(p),
         )
 
-    def predict(self, s: Settings) -> np.ndarray:
+    def predict(self, s: ForwardSettings) -> np.ndarray:
         """(n, 3) N on the tool, local frames."""
         t = self.touches
         y = t.travel.copy()
@@ -133,7 +133,7 @@ class Forward:
             self._follow(s, y, f)
         return self._read(s, f) if s.readings else f
 
-    def _elastic(self, s: Settings, y: np.ndarray) -> np.ndarray:
+    def _elastic(self, s: ForwardSettings, y: np.ndarray) -> np.ndarray:
         """(n, 3) N, the touch's own force along the path y; the last few are kept.
 
         Force goes with the modulus where the spring of the tool is measured in it, so another modulus,
@@ -162,7 +162,7 @@ class Forward:
             self._kept[key] = f
         return f * (s.modulus / usual)
 
-    def _follow(self, s: Settings, y: np.ndarray, f: np.ndarray) -> None:
+    def _follow(self, s: ForwardSettings, y: np.ndarray, f: np.ndarray) -> None:
         """The laws along the path, on f in place. Thinned samples are means over a step."""
         t, path = self.touches, path_numbers(s.touch)
         averaged = kernel.SUB_PLACES if t.block > 1 else 1
@@ -171,7 +171,7 @@ class Forward:
             path.reach_m[0], averaged, new_memory(path, 1)[0], f,
         )  # fmt: skip
 
-    def _read(self, s: Settings, f: np.ndarray) -> np.ndarray:
+    def _read(self, s: ForwardSettings, f: np.ndarray) -> np.ndarray:
         """(n, 3) N, what the instrument makes of the force; local frames."""
         frame = self.touches.frame[self.touches.press]
         device = np.einsum("nji,nj->ni", frame, f)
@@ -192,7 +192,7 @@ def solved(forward: Forward, progress: Progress = silent) -> Forward:
     known = TouchedPlaces(t.normal, far, places.curvature, places.bracing)
     felt = felt_surface(model)
     exact = solve_touched(
-        model.mesh, Touched(t.point, place_of(t), t.deepest, known), LAWS, ratio=model.element_ratio,
+        model.mesh, PlacesToSolve(t.point, place_of(t), t.deepest, known), LAWS, ratio=model.element_ratio,
         poisson_ratio=model.material.poisson_ratio, young_modulus_pa=model.material.young_modulus_pa,
         tip_radius_m=forward.tip_radius, surface=(felt.points, felt.triangles), progress=progress,
     )  # fmt: skip

@@ -35,7 +35,7 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Seen:
+class SampleEvidence:
     """What the samples themselves show: the signal without it, and the effect's keys; {} where it is not
     there."""
 
@@ -52,7 +52,7 @@ class NumericalEffect(Effect):
     """
 
     advice: str = ""
-    see: Callable[[Signal], Seen] | None = None
+    see: Callable[[Signal], SampleEvidence] | None = None
 
 
 def signal_of(presses: Presses, force: np.ndarray) -> Signal:

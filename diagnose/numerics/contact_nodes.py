@@ -9,10 +9,10 @@ import numpy as np
 
 from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
 from palpate.mechanics.contact.dent import grid
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 
 _JOIN = 3.0
 """How sharply punch and sphere meet."""
@@ -26,7 +26,7 @@ def punch_factors(radius_ratio: float) -> tuple[np.ndarray, np.ndarray]:
     return (1 + (1.5 * wider) ** _JOIN) ** (1 / _JOIN), (1 + wider**_JOIN) ** (1 / _JOIN)
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     if values[0] > 0:
         settings.touch.factors.append(lambda poisson_ratio: punch_factors(values[0]))
         settings.onset = settings.onset - values[1] * values[0] ** 2 * scene.tip_radius
@@ -42,7 +42,7 @@ EFFECT = NumericalEffect(
         Parameter("radius_ratio", "1", 0.0, 4.0, 0.0, (0.3, 0.8, 0.8, 1.5), 0.02),
         Parameter("late_share", "1", 0.0, 1.0, 0.0, (0.0, 0.0, 0.5, 0.0), 0.02, 0.5),
     ),
-    keys={"effective_radius_m": Key(low=0.0, high=1.0, unit="m", required=True)},
+    keys={"effective_radius_m": FileKey(low=0.0, high=1.0, unit="m", required=True)},
     report=lambda values, scene, modulus_pa: {
         "effective_radius_m": float(values[0] * scene.tip_radius),
         "late_m": float(values[1] * values[0] ** 2 * scene.tip_radius),

@@ -13,10 +13,10 @@ import numpy as np
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
 from palpate.mechanics.contact.dent import grid
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 
 
 def layer_factors(share: float) -> tuple[np.ndarray, np.ndarray]:
@@ -27,13 +27,13 @@ def layer_factors(share: float) -> tuple[np.ndarray, np.ndarray]:
     return left**1.5, np.sqrt(left)
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.tool_compliance += values[0]
     if values[1] > 0:
         settings.touch.factors.append(lambda poisson_ratio: layer_factors(values[1]))
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     assert isinstance(scene, Forward), "numerical effects act on the presses of a diagnosis"
     plane = modulus_pa / (1 - scene.ideal(modulus_pa).nu ** 2)
     # springs side by side are told as one by what they give where presses are deepest: 1 / (s pi R d)
@@ -51,7 +51,7 @@ EFFECT = NumericalEffect(
         Parameter("compliance_m_per_n", "m/N", 0.0, 0.05, 0.0, (2e-4, 1e-3, 0.0, 0.0), 2e-5),
         Parameter("layer", "1", 0.0, 2.0, 0.0, (0.0, 0.0, 0.05, 0.3), 0.005),
     ),
-    keys={"stiffness_n_per_m": Key(low=1.0, high=1e12, unit="N/m", required=True)},
+    keys={"stiffness_n_per_m": FileKey(low=1.0, high=1e12, unit="N/m", required=True)},
     report=_report,
     change=_change,
     advice="raise the contact stiffness (a penalty of ten times the object's own stiffness under the tip "

@@ -6,8 +6,8 @@ import dataclasses
 import numpy as np
 from scipy.ndimage import grey_closing
 
-from palpate.diagnosis.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, Seen, Signal
-from palpate.mechanics.disk.schema import Key
+from palpate.diagnosis.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, SampleEvidence, Signal
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Role, Scope, no_keys
 
 LONGEST_S = 0.05
@@ -45,12 +45,12 @@ def filled(signal: Signal, gone: np.ndarray) -> np.ndarray:
     return force
 
 
-def _see(signal: Signal) -> Seen:
+def _see(signal: Signal) -> SampleEvidence:
     gone, held = lost(signal)
     if not gone.any():
-        return Seen(signal, {})
+        return SampleEvidence(signal, {})
     mended = dataclasses.replace(signal, force=filled(signal, gone))
-    return Seen(mended, {"share": float(gone.sum() / held.sum())})
+    return SampleEvidence(mended, {"share": float(gone.sum() / held.sum())})
 
 
 EFFECT = NumericalEffect(
@@ -60,7 +60,7 @@ EFFECT = NumericalEffect(
     words="contact flickers: samples without force in the midst of a press",
     plain_words="the simulated tip loses the surface again and again",
     parameters=(Parameter("share", "1", 0.0, 1.0, 0.0, (0.0,), 0.01),),
-    keys={"share": Key(low=0.0, high=1.0, required=True)},
+    keys={"share": FileKey(low=0.0, high=1.0, required=True)},
     report=no_keys,
     role=Role.FREE_AIR,
     see=_see,

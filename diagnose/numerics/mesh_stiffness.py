@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 
 
-def _stiffer(scene: Scene) -> np.ndarray:
+def _stiffer(scene: TouchedScene) -> np.ndarray:
     """(p,) how stiff a place is against the others: mean 0, standard deviation 1."""
     # what a place gives beside its dent, and the dent of a quarter of the tip's radius
     soft = np.log(np.maximum(scene.places.far[:, 0, 0] + 1 / scene.tip_radius, 1e-3))
@@ -23,15 +23,15 @@ def _stiffer(scene: Scene) -> np.ndarray:
     return (soft.mean() - soft) / spread if spread > 1e-6 else np.zeros(len(soft))
 
 
-def _ratio(values: np.ndarray, scene: Scene) -> np.ndarray:
+def _ratio(values: np.ndarray, scene: TouchedScene) -> np.ndarray:
     return np.exp(values[0] + values[1] * _stiffer(scene))
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.stiffness = settings.stiffness * _ratio(values, scene)
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     ratio = _ratio(values, scene)
     return {
         "ratio": float(np.exp(values[0])),
@@ -50,7 +50,7 @@ EFFECT = NumericalEffect(
         Parameter("log_ratio", "1", -2.5, 2.5, 0.0, (0.2, -0.2), 0.01),
         Parameter("log_ratio_a_spread", "1", -0.6, 0.6, 0.0, (0.0, 0.0), 0.01, 0.1),
     ),
-    keys={"ratio": Key(low=1e-3, high=1e3, required=True)},
+    keys={"ratio": FileKey(low=1e-3, high=1e3, required=True)},
     report=_report,
     change=_change,
     advice="refine the mesh, use quadratic elements, or lower Poisson's ratio by steps (0.49, 0.47, 0.45) "

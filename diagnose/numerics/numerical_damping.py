@@ -4,9 +4,9 @@ import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
-from palpate.mechanics.effects.settings import WEIGHED, Scene, Settings
+from palpate.mechanics.effects.settings import WEIGHED, ForwardSettings, TouchedScene
 
 
 def _velocity(scene: Forward) -> np.ndarray:
@@ -19,7 +19,7 @@ def _velocity(scene: Forward) -> np.ndarray:
     return out
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     assert isinstance(scene, Forward), "numerical effects act on the presses of a diagnosis"
     velocity = _velocity(scene)
     normal = scene.places.frame[scene.press, 0]
@@ -41,7 +41,7 @@ EFFECT = NumericalEffect(
     words="force that grows with the tip's speed, which no parameter states",
     plain_words="the simulated object resists fast presses more than slow ones",
     parameters=(Parameter("damping_n_s_per_m", "N s/m", 0.0, 200.0, 0.0, (0.5, 3.0), 0.05),),
-    keys={"damping_n_s_per_m": Key(low=0.0, high=1e6, unit="N s/m", required=True)},
+    keys={"damping_n_s_per_m": FileKey(low=0.0, high=1e6, unit="N s/m", required=True)},
     report=lambda values, scene, modulus_pa: {"damping_n_s_per_m": float(values[0])},
     change=_change,
     advice="lower the damping of contact and material, or take smaller time steps (implicit integrators damp "

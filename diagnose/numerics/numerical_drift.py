@@ -3,12 +3,12 @@
 import numpy as np
 
 from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     begun = scene.t[scene.start[:-1]]
     towards = scene.places.frame[:, 0] @ values
     settings.onset = settings.onset + (begun - begun.min()) * towards
@@ -23,7 +23,7 @@ EFFECT = NumericalEffect(
     parameters=tuple(
         Parameter(f"velocity_{a}_m_per_s", "m/s", -1e-3, 1e-3, 0.0, (0.0,), 1e-7) for a in "xyz"
     ),
-    keys={"velocity_m_per_s": Key(low=-1.0, high=1.0, size=3, unit="m/s", required=True)},
+    keys={"velocity_m_per_s": FileKey(low=-1.0, high=1.0, size=3, unit="m/s", required=True)},
     report=lambda values, scene, modulus_pa: {"velocity_m_per_s": [float(v) for v in values]},
     change=_change,
     advice="fix the base's nodes outright (no soft constraint), let the body come to rest before each press",

@@ -10,9 +10,9 @@ import dataclasses
 
 import numpy as np
 
-from palpate.diagnosis.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, Seen, Signal
+from palpate.diagnosis.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, SampleEvidence, Signal
 from palpate.diagnosis.numerics.lost_contact import LONGEST_S
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Role, Scope, no_keys
 from palpate.mechanics.recording.segments import runs
 
@@ -69,7 +69,7 @@ def _turned(push: np.ndarray, depth: np.ndarray, t: np.ndarray, usual: float) ->
     return None
 
 
-def _see(signal: Signal) -> Seen:
+def _see(signal: Signal) -> SampleEvidence:
     left, push, never, from_m = signal.left.copy(), signal.push, 0, []
     usual = float(np.median([push[part].max(initial=0.0) for part in signal.parts]))
     for part in signal.parts:
@@ -85,10 +85,10 @@ def _see(signal: Signal) -> Seen:
             # from where it fell through until it has come out again
             left[part.start + fell : part.stop] = True
     if not from_m:
-        return Seen(signal, {})
+        return SampleEvidence(signal, {})
     mended = dataclasses.replace(signal, left=left)
     keys = {"share": len(from_m) / len(signal.parts), "never_felt": never / len(signal.parts)}
-    return Seen(mended, keys | {"from_depth_m": float(np.median(from_m))})
+    return SampleEvidence(mended, keys | {"from_depth_m": float(np.median(from_m))})
 
 
 EFFECT = NumericalEffect(
@@ -98,7 +98,7 @@ EFFECT = NumericalEffect(
     words="the tip passes through the surface: inside, and pushed back less, not at all, or pulled in",
     plain_words="the simulated tip falls through the surface and is not pushed back any more",
     parameters=(Parameter("share", "1", 0.0, 1.0, 0.0, (0.0,), 0.01),),
-    keys={"share": Key(low=0.0, high=1.0, required=True)},
+    keys={"share": FileKey(low=0.0, high=1.0, required=True)},
     report=no_keys,
     role=Role.FREE_AIR,
     see=_see,

@@ -46,7 +46,7 @@ def sizes_alone(
     numerics: Numerics,
     wrong: Sequence[str],
     measured: Stated,
-    weighing: Weighing,
+    weighing: GapSums,
 ) -> dict[str, float]:
     """{name: N rms over contact samples} of the named numerics and the wrong parameters, with everything else
     as the recording says. forward: of all presses of the simulation."""
@@ -67,14 +67,14 @@ def sizes_alone(
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutForces:
     """Of real presses, each place by a fit that has not seen it: force (n, 3) N, local; modulus (n,) Pa."""
 
     force: np.ndarray
     modulus: np.ndarray
 
 
-def held_out(search: Search, found: Fit) -> HeldOut:
+def held_out(search: Search, found: Fit) -> HeldOutForces:
     """The force that a set of effects predicts; its modulus is the one of the plain misfit, as in gaps."""
     t = search.forward.touches
     force, modulus = np.zeros_like(t.local_force), np.zeros(len(t.t))
@@ -91,7 +91,7 @@ def held_out(search: Search, found: Fit) -> HeldOut:
         rows = np.isin(t.site, fold)[t.press]
         force[rows] = (t.local_force - again.residual + level * by_modulus)[rows]
         modulus[rows] = again.modulus * (1 + level)
-    return HeldOut(force, modulus)
+    return HeldOutForces(force, modulus)
 
 
 PARAMETER_OF = {
@@ -115,8 +115,8 @@ class Reality:
     softer."""
 
     measured: np.ndarray
-    ideal: HeldOut
-    full: HeldOut
+    ideal: HeldOutForces
+    full: HeldOutForces
     names: tuple[str, ...]
     modulus: np.ndarray
 
@@ -176,7 +176,7 @@ def measured_parameters(
 
 
 @dataclass(frozen=True)
-class Weighing:
+class GapSums:
     """How gaps (n, 3) N are added up: group (n,) the place of each row, -1 where it does not count; added:
     N^2, the noise that thinning took off; noise_n: N, of the 3-vector."""
 
@@ -209,7 +209,7 @@ class Weighing:
 
 
 @dataclass(frozen=True)
-class Parameter:
+class StatedParameter:
     """A stated parameter that is named: what it adds to our law, (n, 3) N, and its two values."""
 
     name: str
@@ -224,9 +224,9 @@ def wrong_parameters(
     numerics: Numerics,
     measured: Stated,
     modulus: np.ndarray,
-    weighing: Weighing,
+    weighing: GapSums,
     rules: AttributionOptions,
-) -> list[Parameter]:
+) -> list[StatedParameter]:
     """The stated parameters that the recording contradicts, the one that takes most first.
 
     gap: (n, 3) N, without the numerics. modulus: (n,) Pa, the recording's, at each place by the others. Named
@@ -234,11 +234,11 @@ def wrong_parameters(
     """
     least = rules.smallest * weighing.noise_n
     current = forward.stated
-    found: list[Parameter] = []
+    found: list[StatedParameter] = []
     noise = max(weighing.noise_n**2 - weighing.added, 0.0)
     while True:
         law = law_at(forward, current, numerics)
-        best: tuple[float, Parameter, np.ndarray] | None = None
+        best: tuple[float, StatedParameter, np.ndarray] | None = None
         for name, key in PARAMETER_OF.items():
             was, now = getattr(current, key), getattr(measured, key)
             if was == now or any(p.name == name for p in found):
@@ -257,7 +257,7 @@ def wrong_parameters(
                 continue
             drop = float(before.sum() - after.sum())
             if best is None or drop > best[0]:
-                best = drop, Parameter(name, change, was, now), gap - change
+                best = drop, StatedParameter(name, change, was, now), gap - change
         if best is None:
             return found
         found.append(best[1])

@@ -17,9 +17,9 @@ from palpate.diagnosis.other_simulator.beside import Sides, beside, named_numeri
 from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions, aligned
 from palpate.diagnosis.other_simulator.parts import (
     PARAMETER_OF,
-    Parameter,
+    GapSums,
     Reality,
-    Weighing,
+    StatedParameter,
     law_at,
     measured_parameters,
     reality_of,
@@ -102,9 +102,9 @@ class _Weighed:
     sides: Sides
     numerics: Numerics
     real: Reality
-    wrong: list[Parameter]
+    wrong: list[StatedParameter]
     measured: Stated
-    weighing: Weighing
+    weighing: GapSums
     gaps: dict[str, np.ndarray]
 
     def square(self, name: str) -> float:
@@ -125,7 +125,7 @@ def _weighed(
     forward, t, rows = sides.forward, sides.forward.touches, sides.rows
     named = {e.name: e.parameters for e in reality.entries if e.name in reality.effects}
     real = reality_of(findings, reality.effects, numerics.strain)
-    weighing = Weighing(
+    weighing = GapSums(
         np.where(t.counted, t.site[t.press], -1), findings.forward.touches.thinned_away, reality.noise_n
     )
     modulus = real.modulus[rows]

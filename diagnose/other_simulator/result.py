@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.diagnosis.numerics.registry import numerical
 from palpate.diagnosis.other_simulator.against_law import Numerics
-from palpate.diagnosis.other_simulator.parts import Parameter
+from palpate.diagnosis.other_simulator.parts import StatedParameter
 from palpate.diagnosis.other_simulator.stated import Stated
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry, answers_json
 from palpate.diagnosis.verdict.where import Where
@@ -31,7 +31,7 @@ _MEANT = {
 
 def advice_of(
     numerics: Numerics,
-    wrong: Sequence[Parameter],
+    wrong: Sequence[StatedParameter],
     real: Sequence[str],
     own_words: Mapping[str, str],
     *,
@@ -56,7 +56,7 @@ def advice_of(
     return tuple(said)
 
 
-def parameter_words(wrong: Parameter, poisson_limit: float = math.inf) -> str:
+def parameter_words(wrong: StatedParameter, poisson_limit: float = math.inf) -> str:
     """What to give a simulator whose Poisson's ratio may be no greater than that."""
     what, unit = _MEANT[wrong.name]
     now = f"{wrong.measured:.4g} {unit}".strip()

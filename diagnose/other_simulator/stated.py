@@ -10,17 +10,17 @@ from typing import Any, ClassVar
 
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.mechanics.compliance.far_field import far_at_poisson
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
-from palpate.mechanics.effects.settings import STICKS, Settings
+from palpate.mechanics.effects.settings import STICKS, ForwardSettings
 from palpate.mechanics.effects.tip_radius import EFFECT as TIP
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.names import number, pairs
 from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 
-_FRICTION = Key(low=0.0, high=100.0, unknown=True)
-KEYS: dict[str, Key] = {
+_FRICTION = FileKey(low=0.0, high=100.0, unknown=True)
+KEYS: dict[str, FileKey] = {
     "young_modulus_pa": YOUNG_MODULUS,
     "poisson_ratio": POISSON_RATIO,
     "friction": _FRICTION,
@@ -97,7 +97,7 @@ class StatedForward(Forward):
     measured: ClassVar[bool] = False
     stated: Stated = field(default_factory=lambda: Stated(1.0, 0.49, STICKS, 1.0))
 
-    def ideal(self, modulus: float) -> Settings:
+    def ideal(self, modulus: float) -> ForwardSettings:
         """Settings of the ideal model at the stated parameters; `modulus` does not count."""
         given = self.stated
         settings = super().ideal(given.young_modulus_pa)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.rivals import confidence_set_p, of_one_phenomenon, rivals_of
 from palpate.mechanics.effects.base import Effect, Scope
@@ -34,8 +34,8 @@ SURE = 2.0
 
 
 def fewer(
-    search: Search, chosen: Sequence[str], current: Candidate, alone: dict[str, Score], seen: frozenset[str]
-) -> tuple[Candidate, list[str]]:
+    search: Search, chosen: Sequence[str], current: JudgedSet, alone: dict[str, Score], seen: frozenset[str]
+) -> tuple[JudgedSet, list[str]]:
     """(the set, its names): what was chosen, or fewer that do as well within one standard error.
 
     alone: every effect by itself, of the first step. seen: names that stay.
@@ -78,7 +78,7 @@ def _sets(
                 yield [*kept, other]
 
 
-def _cost(search: Search, candidate: Candidate) -> np.ndarray:
+def _cost(search: Search, candidate: JudgedSet) -> np.ndarray:
     """(g,) less the log likelihood of each group left out, by the covariance as it is at the set's own
     fit."""
     there = search.reweighed(candidate.found)
@@ -102,13 +102,13 @@ class Attribution:
     p value by which each effect, and 'none', is in the first step's model confidence set.
     """
 
-    base: Candidate
-    ideal: Candidate
-    deep: Candidate
+    base: JudgedSet
+    ideal: JudgedSet
+    deep: JudgedSet
     scores: dict[str, Score]
     chosen: tuple[str, ...]
     rivals: tuple[str, ...]
-    final: Candidate
+    final: JudgedSet
     steps: tuple[dict[str, Score], ...]
     picked: tuple[str, ...]
     finite_strain_gain: float
@@ -227,8 +227,8 @@ def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:
 
 
 def _with_hidden_strain(
-    search: Search, effect: Effect, candidate: Candidate, current: Candidate
-) -> Candidate:
+    search: Search, effect: Effect, candidate: JudgedSet, current: JudgedSet
+) -> JudgedSet:
     """The candidate, or with finite strain beside it where each may have hidden the other."""
     if not effect.hints.hides_strain or search.finite_strain in current.found.effects:
         return candidate
@@ -237,7 +237,7 @@ def _with_hidden_strain(
 
 
 def _able_together(
-    search: Search, effects: Sequence[Effect], current: Candidate, scores: dict[str, Score]
+    search: Search, effects: Sequence[Effect], current: JudgedSet, scores: dict[str, Score]
 ) -> list[Effect]:
     """What may close a gap two at a time where none does alone: effects in time, as memory and delay bend
     loops opposite ways; of a simulator's force, which no noise hides, whatever the places show."""
@@ -251,7 +251,7 @@ def _able_together(
     return list({e.hints.phenomenon or e.name: e for e in reversed(able)}.values())
 
 
-def _paired(search: Search, able: Sequence[Effect], current: Candidate) -> Candidate | None:
+def _paired(search: Search, able: Sequence[Effect], current: JudgedSet) -> JudgedSet | None:
     """Two effects that close the gap only together."""
     found = []
     for one, two in itertools.combinations(able, 2):
@@ -268,7 +268,7 @@ def _not_blind_to_slip(search: Search, passing: list[Score]) -> list[Score]:
     return [s for s in passing if not s.effect.scope.between_places or not search.sideways_off(s.candidate)]
 
 
-def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
+def _refined(search: Search, effect: Effect, current: JudgedSet) -> JudgedSet:
     """The set with an effect's law made exact at its fit, twice; as it was where its law is exact already."""
     if effect.hints.refine is None:
         return current
@@ -279,7 +279,7 @@ def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
     return current
 
 
-def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
+def _reexamined(search: Search, score: Score, current: JudgedSet) -> Score:
     """The score with size and plain gap as they are where nuisances are weighed at the new fit.
 
     Where an effect changes the force much, first touches and stiffnesses of the old fit had made up for it.
@@ -291,7 +291,7 @@ def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
     return dataclasses.replace(again, gain=score.gain, per_group=score.per_group)
 
 
-def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, float, float]:
+def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[JudgedSet, float, float]:
     """The set with or without finite strain, whichever fits better, the gain of having it, and what it closes
     of held-out squares, N^2: a law may be far likelier where noise is small, and still predict worse."""
     rest = [e for e in effects if e is not search.finite_strain]
@@ -305,8 +305,8 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, 
 
 
 def _without_idle(
-    search: Search, chosen: list[str], current: Candidate, seen: frozenset[str]
-) -> tuple[Candidate, list[str]]:
+    search: Search, chosen: list[str], current: JudgedSet, seen: frozenset[str]
+) -> tuple[JudgedSet, list[str]]:
     """Drop effects that later ones made idle, and what was seen elsewhere where it makes the held-out gap
     larger: a reading may be wrong."""
     chosen = list(chosen)
@@ -329,7 +329,7 @@ def _without_idle(
     return current, chosen
 
 
-def _strongest_first(search: Search, final: Candidate, chosen: list[str]) -> list[str]:
+def _strongest_first(search: Search, final: JudgedSet, chosen: list[str]) -> list[str]:
     if len(chosen) < 2:
         return list(chosen)
     loss = {}

@@ -21,7 +21,7 @@ from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.descent import Descent, first_touches, fit
 from palpate.diagnosis.search.fit import Fit, settings_of
 from palpate.diagnosis.search.gaps import closed_share, lower_closure, modulus_share
-from palpate.diagnosis.search.leave_one_out import Candidate, held_out
+from palpate.diagnosis.search.leave_one_out import JudgedSet, held_out
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.effects.base import Effect
@@ -62,7 +62,7 @@ class Search:
         self.whitener = Whitener(self.forward, settings, self.nuisance, self.site_sd)
         self.dof = 3.0 * float(self.whitener.counts().sum())
         self._near = found
-        self._cache: dict[tuple[str, ...], Candidate] = {}
+        self._cache: dict[tuple[str, ...], JudgedSet] = {}
 
     def reweighed(self, found: Fit) -> Search:
         """The same search, weighing with the nuisances as they are at a fit."""
@@ -70,7 +70,7 @@ class Search:
         other.renew(found)
         return other
 
-    def judge(self, effects: Sequence[Effect], like: Candidate | None = None) -> Candidate:
+    def judge(self, effects: Sequence[Effect], like: JudgedSet | None = None) -> JudgedSet:
         """Fit a set and judge it on held-out groups; starts from `like`, or from what was last settled on."""
         key = tuple(sorted(e.name for e in effects))
         if key in self._cache:
@@ -86,11 +86,11 @@ class Search:
         runs = (descent.run(starts[i], near.onset, 12) for i in np.argsort(scored)[:3])
         found = min(runs, key=lambda f: f.loss)
         held, plain = held_out(found, descent)
-        candidate = Candidate(found, held, plain, self.dof)
+        candidate = JudgedSet(found, held, plain, self.dof)
         self._cache[key] = candidate
         return candidate
 
-    def score(self, added: Sequence[Effect], new: Candidate, old: Candidate) -> Score:
+    def score(self, added: Sequence[Effect], new: JudgedSet, old: JudgedSet) -> Score:
         """Compare a candidate with the one that lacks `added`."""
         extra = len(new.found.values) - len(old.found.values)
         over = max(1.0, new.chi) * self.forward.touches.noise.variance_inflation
@@ -124,7 +124,7 @@ class Search:
             return False
         return score.closure > 0 and score.probability > self.options.sure
 
-    def sideways_off(self, candidate: Candidate) -> float:
+    def sideways_off(self, candidate: JudgedSet) -> float:
         """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.
 
         The nuisances trust the stick to a share only, press by press, so a fit may let that force go wrong.
@@ -158,7 +158,7 @@ MOVES = 5
 """Steps of a parameter that is moved from where it does nothing."""
 
 
-def detectable(search: Search, base: Candidate, effects: Sequence[Effect]) -> dict[str, float]:
+def detectable(search: Search, base: JudgedSet, effects: Sequence[Effect]) -> dict[str, float]:
     """{name: N rms over contact samples, a common factor taken off} of the smallest change that shows.
 
     Infinite where nothing of an effect is left beside modulus and nuisances.

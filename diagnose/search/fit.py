@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.mechanics.effects.base import Effect
-from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.effects.settings import ForwardSettings
 
 MODULUS_STEP = 0.01
 
@@ -69,7 +69,7 @@ class Fit:
 
 def settings_of(
     forward: Forward, effects: Sequence[Effect], values: np.ndarray, onset: np.ndarray | None = None
-) -> Settings:
+) -> ForwardSettings:
     """The forward model's settings for a vector of log modulus and effect parameters, first touches moved."""
     settings = forward.ideal(float(np.exp(values[0])))
     if onset is not None:

@@ -19,7 +19,7 @@ linear answer is no place that the other groups would choose."""
 
 
 @dataclass(frozen=True)
-class Candidate:
+class JudgedSet:
     """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the
     base."""
 

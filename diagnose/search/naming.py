@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import expit
 
-from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.mechanics.effects.base import Effect
 
 
@@ -56,7 +56,7 @@ class Score:
     share: float
     closes: float
     per_group: np.ndarray
-    candidate: Candidate
+    candidate: JudgedSet
 
     @property
     def effect(self) -> Effect:

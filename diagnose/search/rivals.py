@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import Score
 from palpate.mechanics.effects.base import Effect
 
@@ -81,7 +81,7 @@ def of_one_phenomenon(effect: Effect, others: Sequence[Effect]) -> bool:
     )
 
 
-def alike(search: Search, base: Candidate, candidates: dict[str, Candidate]) -> list[tuple[str, str, float]]:
+def alike(search: Search, base: JudgedSet, candidates: dict[str, JudgedSet]) -> list[tuple[str, str, float]]:
     """Pairs whose best-fit patterns point the same way once modulus and nuisance are taken out, closest
     first."""
     names = list(candidates)

@@ -21,7 +21,7 @@ from scipy.linalg import cho_factor, solve_triangular
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.forward.touches import FOLLOWED
 from palpate.diagnosis.options import NuisanceOptions
-from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.effects.settings import ForwardSettings
 from palpate.mechanics.presses.table import Presses
 
 _FEW_COLUMNS = 3
@@ -30,7 +30,7 @@ _MODES = 2
 
 
 @dataclass
-class Block:
+class WhitenedGroup:
     """One group's rows (flat indices of counted samples), the factor L of I + N^T N / sigma^2, and L^-1 N^T,
     N the nuisances over how much louder than sigma their rows are."""
 
@@ -48,7 +48,7 @@ class Whitener:
     def __init__(
         self,
         forward: Forward,
-        settings: Settings,
+        settings: ForwardSettings,
         options: NuisanceOptions,
         site_sd: np.ndarray | None = None,
         onset_sd: np.ndarray | None = None,
@@ -61,7 +61,7 @@ class Whitener:
         share = options.floor_share * np.linalg.norm(before, axis=1)
         bridges, self.air, unbridged = _bridges(self.touches)
         self.louder = np.sqrt(1 + (share**2 + unbridged) / self.variance)
-        self.blocks: list[Block] = []
+        self.blocks: list[WhitenedGroup] = []
         presses = len(self.touches)
         stated = np.hypot(options.onset_m, self.touches.onset_error_m)
         self.onset_sd = stated if onset_sd is None else onset_sd
@@ -80,7 +80,7 @@ class Whitener:
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
             factor = cho_factor(small, lower=True)
             halved = solve_triangular(factor[0], matrix.T, lower=True)
-            self.blocks.append(Block(rows, factor, halved))
+            self.blocks.append(WhitenedGroup(rows, factor, halved))
         self.explained = brought / float(self.counts().sum())
         """N^2, the mean square of a sample's 3-vector that noise and nuisances bring about."""
 
@@ -150,7 +150,7 @@ def _inner(x: np.ndarray, starts: np.ndarray) -> np.ndarray:
 
 def nuisance_columns(
     forward: Forward,
-    settings: Settings,
+    settings: ForwardSettings,
     before: np.ndarray,
     options: NuisanceOptions,
     site_sd: np.ndarray | None,

@@ -44,7 +44,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
-class Curve:
+class MachineCycle:
     """One cycle of a machine: t (n,) s increasing, travel (n,) m into the sample from any zero, force (n,) N
     that pushes the tip out, from any level. name: of its file. level_n: what it reads in free air; None: what
     the first rows read."""
@@ -103,7 +103,7 @@ class Bench:
 
 
 def bench_of(
-    curves: Sequence[Curve],
+    curves: Sequence[MachineCycle],
     tip_radius_m: float,
     *,
     layer_m: float | None = None,
@@ -174,7 +174,7 @@ def bench_of(
     return Bench(lifted, model, similarity, every[0], every[1], used, specimens)
 
 
-def _levelled(curve: Curve, pace: float) -> Curve:
+def _levelled(curve: MachineCycle, pace: float) -> MachineCycle:
     """At a hand's pace, of at most RATE_HZ by means."""
     rate = (len(curve.t) - 1) / float(curve.t[-1] - curve.t[0]) / pace
     # a long hold must not thin a quick way in
@@ -183,10 +183,10 @@ def _levelled(curve: Curve, pace: float) -> Curve:
     t, travel, force = (
         v[: count * block].reshape(count, block).mean(axis=1) for v in (curve.t, curve.travel, curve.force)
     )
-    return Curve(pace * (t - t[0]), travel, force, curve.name, curve.level_n)
+    return MachineCycle(pace * (t - t[0]), travel, force, curve.name, curve.level_n)
 
 
-def _way_in(curve: Curve) -> tuple[np.ndarray, np.ndarray, float] | None:
+def _way_in(curve: MachineCycle) -> tuple[np.ndarray, np.ndarray, float] | None:
     """(travel, force over the level before contact, noise N) from the start to the peak; None without a
     contact."""
     peak = int(np.argmax(curve.force))
@@ -201,7 +201,7 @@ def _way_in(curve: Curve) -> tuple[np.ndarray, np.ndarray, float] | None:
     return curve.travel[: peak + 1], force[: peak + 1], noise
 
 
-def _level(curve: Curve, peak: int) -> float:
+def _level(curve: MachineCycle, peak: int) -> float:
     """N, what the curve reads in free air."""
     early = curve.force[: max(3, int(_BASELINE * peak))]
     return float(np.median(early)) if curve.level_n is None else curve.level_n
@@ -213,7 +213,7 @@ def _modulus(each: Loading, onset: float, law: Any, poisson_ratio: float) -> flo
 
 
 def _side_by_side(
-    curves: Sequence[Curve], onset: np.ndarray, length: float, factor: np.ndarray, noise: float
+    curves: Sequence[MachineCycle], onset: np.ndarray, length: float, factor: np.ndarray, noise: float
 ) -> tuple[Recording, list[tuple[int, int]]]:
     """One recording of all curves in a hand's size, the surface at z = 0; (first, last) rows of each."""
     rate = min((len(c.t) - 1) / float(np.ptp(c.t)) for c in curves)
@@ -223,7 +223,7 @@ def _side_by_side(
         t = np.arange(0.0, curve.t[-1], 1 / rate)
         travel, force = (np.interp(t, curve.t, v) for v in (curve.travel, curve.force))
         peak = int(np.argmax(force))
-        level = _level(Curve(t, travel, force, level_n=curve.level_n), peak)
+        level = _level(MachineCycle(t, travel, force, level_n=curve.level_n), peak)
         times.append(clock + t)
         heights.append(HAND_TIP_M + at - length * travel)
         forces.append(scale * (force - level))

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.specimen.approach import approach_of
-from palpate.diagnosis.specimen.bench import Bench, Curve, bench_of
+from palpate.diagnosis.specimen.bench import Bench, MachineCycle, bench_of
 from palpate.diagnosis.specimen.bench_diagnosis import (
     diagnose_bench,
     held_out_rivals,
@@ -77,7 +77,7 @@ def material_of(
         return _relaxation(tests, names)
     assert tests.tip_radius_m is not None
 
-    def bench(curves: Sequence[Curve]) -> Bench:
+    def bench(curves: Sequence[MachineCycle]) -> Bench:
         assert tests.tip_radius_m is not None
         return bench_of(
             curves, tests.tip_radius_m, layer_m=layer_m, poisson_ratio=poisson_ratio, specimens=specimens

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.result import Result
 from palpate.reconstruction.machine_curves.uniaxial import Uniaxial
@@ -30,7 +30,7 @@ class MachineTests:
     said. notes: what was understood of the files; odds: of the least sure of it."""
 
     kind: str
-    curves: tuple[Curve, ...] = ()
+    curves: tuple[MachineCycle, ...] = ()
     tests: tuple[Uniaxial, ...] = ()
     holds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     tip_radius_m: float | None = None

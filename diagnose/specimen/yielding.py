@@ -87,7 +87,7 @@ def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> Way:
     return Way.thinned(u[near], net[near], float(slope))
 
 
-class _Fit:
+class _YieldingFit:
     """One law, a machine that yields or not: E, c = 1 / K, and each way's first touch, least squares in N."""
 
     def __init__(self, law: str, poisson_ratio: float, radius_m: float, deepest_m: float) -> None:
@@ -158,14 +158,17 @@ def left_out_error(ways: Sequence[Way], poisson_ratio: float, radius_m: float, m
     """rms of the blocks of force that the best law misses, on a rigid machine or one that yields, over the
     rms of the force. modulus_pa: a first guess."""
     deepest, guess = max(float(w.travel[-1] - w.travel[0]) for w in ways), float(np.log(modulus_pa))
-    fits = (_Fit(name, poisson_ratio, radius_m, deepest) for name in LAWS)
+    fits = (_YieldingFit(name, poisson_ratio, radius_m, deepest) for name in LAWS)
     return min(fit.left_out(ways, guess, yields)[2] for fit in fits for yields in (False, True)) / _rms(ways)
 
 
 def own_moduli(ways: Sequence[Way], poisson_ratio: float, radius_m: float, machine: Machine) -> np.ndarray:
     """(w,) Pa of each way by itself, by the machine's law and stiffness."""
     deepest = max(float(w.travel[-1] - w.travel[0]) for w in ways)
-    fit, start = _Fit(machine.law, poisson_ratio, radius_m, deepest), float(np.log(machine.modulus_pa))
+    fit, start = (
+        _YieldingFit(machine.law, poisson_ratio, radius_m, deepest),
+        float(np.log(machine.modulus_pa)),
+    )
     found = []
     for way in ways:
         less = Way(way.travel - way.push / machine.stiffness_n_per_m, way.push)
@@ -181,7 +184,9 @@ def rigid_interval(
     deepest, guess = max(float(w.travel[-1] - w.travel[0]) for w in ways), float(np.log(modulus_pa))
     low, high, middle = 0.0, 0.0, 0.0
     for k, law in enumerate(laws):
-        (log_e, _), apart, _ = _Fit(law, poisson_ratio, radius_m, deepest).left_out(ways, guess, False)
+        (log_e, _), apart, _ = _YieldingFit(law, poisson_ratio, radius_m, deepest).left_out(
+            ways, guess, False
+        )
         middle, half = (middle if k else log_e), _TIMES * float(_jackknifed(apart)[0])
         low, high = min(low, log_e - half - middle), max(high, log_e + half - middle)
     return modulus_pa * float(np.exp(low)), modulus_pa * float(np.exp(high))
@@ -205,7 +210,7 @@ def machine_of(
     whole: dict[tuple[str, bool], tuple[float, float]] = {}
     apart: dict[tuple[str, bool], list[tuple[float, float]]] = {}
     for name in LAWS:
-        fit = _Fit(name, poisson_ratio, radius_m, deepest)
+        fit = _YieldingFit(name, poisson_ratio, radius_m, deepest)
         for yields in (False, True):
             whole[name, yields], apart[name, yields], missed = fit.left_out(ways, guess, yields)
             errors[name, yields] = missed / rms

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from palpate.diagnosis.specimen.bench import Bench, Curve
+from palpate.diagnosis.specimen.bench import Bench, MachineCycle
 from palpate.diagnosis.specimen.yielding import Way, left_out_error
 from palpate.mechanics.contact.dent import dent_law
 from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
@@ -27,8 +27,8 @@ _AIR = 0.03
 
 
 def late_contact(
-    curves: Sequence[Curve], poisson_ratio: float, radius_m: float
-) -> tuple[list[Curve], str | None]:
+    curves: Sequence[MachineCycle], poisson_ratio: float, radius_m: float
+) -> tuple[list[MachineCycle], str | None]:
     """The curves, whose zero is the file's own where contact began before the first row, and words for that;
     the curves as they are, and None, where free air was recorded or the zero may as well be wrong."""
     first = [_first(c) for c in curves]
@@ -51,7 +51,7 @@ def late_contact(
     return [dataclasses.replace(c, level_n=0.0) for c in curves], words
 
 
-def bias(curves: Sequence[Curve], bench: Bench) -> tuple[float, float] | None:
+def bias(curves: Sequence[MachineCycle], bench: Bench) -> tuple[float, float] | None:
     """(N, Pa): what the machine reads in free air, median of the curves, and the modulus if it were not
     taken off; None where it is not surely above a hundredth of the peak."""
     levels, top, moduli = [], [], []
@@ -79,7 +79,7 @@ def bias(curves: Sequence[Curve], bench: Bench) -> tuple[float, float] | None:
     return level, float(np.median(moduli))
 
 
-def _first(curve: Curve) -> tuple[float, float]:
+def _first(curve: MachineCycle) -> tuple[float, float]:
     """(N, its error): what the first rows of the way in read, where they stand still; the first of them where
     the force rises from the beginning."""
     peak = int(np.argmax(curve.force))
@@ -89,12 +89,12 @@ def _first(curve: Curve) -> tuple[float, float]:
     return (float(np.median(early)), noise) if still else (float(early[:3].mean()), noise)
 
 
-def _way(curve: Curve, level: float) -> Way:
+def _way(curve: MachineCycle, level: float) -> Way:
     peak = int(np.argmax(curve.force))
     return Way.thinned(curve.travel[: peak + 1], curve.force[: peak + 1] - level)
 
 
-def _hertz(curve: Curve, radius_m: float) -> float:
+def _hertz(curve: MachineCycle, radius_m: float) -> float:
     """Pa, a first guess from the whole of the way in."""
     peak = int(np.argmax(curve.force))
     deep = max(float(np.ptp(curve.travel[: peak + 1])), 1e-12)

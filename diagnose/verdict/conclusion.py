@@ -34,7 +34,7 @@ from palpate.diagnosis.verdict.held_out import Gaps, held_out_gaps, without_what
 from palpate.diagnosis.verdict.next_touch import proposed
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
 from palpate.diagnosis.verdict.where import locate
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Role
 from palpate.mechanics.effects.registry import effect
 
@@ -89,7 +89,7 @@ def widened(name: str, parameters: Mapping[str, Any], intervals: Mapping[str, An
     for key, (low, high) in intervals.items():
         value = np.asarray(parameters[key], float)
         stated = keys.get(key)
-        allowed = stated if isinstance(stated, Key) else Key()
+        allowed = stated if isinstance(stated, FileKey) else FileKey()
         wider[key] = [
             np.clip(value + factor * (np.asarray(end, float) - value), allowed.low, allowed.high).tolist()
             for end in (low, high)

@@ -15,7 +15,7 @@ from palpate.diagnosis.search.descent import Descent
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit
 from palpate.diagnosis.search.gaps import gap, resampled
-from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.diagnosis.verdict.answer import Answer, Findings
 from palpate.mechanics.presses.table import Presses
@@ -27,7 +27,7 @@ SHARE = 0.2
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutLosses:
     """plain: (g,) N^2, sums of squares of each site when its fold was not fitted. deepest_n, fastest_n: N rms
     over the places that hold those presses, fitted to all the others."""
 
@@ -90,7 +90,7 @@ def without_what_makes_it_worse(
     return kept.after
 
 
-def put_back(offsets: InstrumentOffsets, whitener: Whitener, candidate: Candidate) -> np.ndarray:
+def put_back(offsets: InstrumentOffsets, whitener: Whitener, candidate: JudgedSet) -> np.ndarray:
     """(g,) N^2: what putting the instrument's readings back adds to a candidate's plain sums of squares."""
     if not offsets.names:
         return np.zeros(whitener.groups)
@@ -98,7 +98,7 @@ def put_back(offsets: InstrumentOffsets, whitener: Whitener, candidate: Candidat
     return gram[:, 1, 1] + 2 * gram[:, 0, 1]
 
 
-def held_out_by_refit(search: Search, found: Fit, extra: np.ndarray | None, added: float) -> HeldOut:
+def held_out_by_refit(search: Search, found: Fit, extra: np.ndarray | None, added: float) -> HeldOutLosses:
     """Fit modulus, effects and first touches again without each fold, and weigh the fold.
 
     extra: (n, 3) N, put back onto the residual (instrument offsets). added: N^2, noise that
@@ -113,7 +113,7 @@ def held_out_by_refit(search: Search, found: Fit, extra: np.ndarray | None, adde
     special = []
     for fold in (deepest(t), fastest(t)):
         special.append(gap(_without(search, found, fold, extra)[fold], counts[fold], added))
-    return HeldOut(plain, *special)
+    return HeldOutLosses(plain, *special)
 
 
 def _without(search: Search, found: Fit, fold: np.ndarray, extra: np.ndarray | None) -> np.ndarray:

@@ -19,11 +19,11 @@ from palpate.diagnosis.options import NuisanceOptions
 from palpate.diagnosis.search.attribution import Attribution
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.leave_one_out import Candidate
+from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.diagnosis.verdict.result import NextTouch
-from palpate.mechanics.effects.settings import Settings
+from palpate.mechanics.effects.settings import ForwardSettings
 
 DEPTHS = (0.35, 0.8, 1.2)
 SPEEDS = (0.004, 0.02, 0.08)
@@ -62,7 +62,7 @@ def _separating(search: Search, scores: dict[str, Score], first: str, second: st
 
 
 def next_touch(
-    forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate], options: NuisanceOptions
+    forward: Forward, first: tuple[str, JudgedSet], second: tuple[str, JudgedSet], options: NuisanceOptions
 ) -> NextTouch:
     """The best press to separate `first` from `second` (name, fitted candidate)."""
     best: tuple[float, float, Plan, int] | None = None
@@ -107,7 +107,7 @@ def next_touch(
     )  # fmt: skip
 
 
-def _rigid(forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate]) -> NextTouch | None:
+def _rigid(forward: Forward, first: tuple[str, JudgedSet], second: tuple[str, JudgedSet]) -> NextTouch | None:
     """Three presses on the bare support, which only a tool that yields gives way to; None where neither
     does."""
     one, other = (_meant(forward, c).tool_compliance for _, c in (first, second))
@@ -120,7 +120,7 @@ def _rigid(forward: Forward, first: tuple[str, Candidate], second: tuple[str, Ca
 
 
 def _retrace(
-    forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate]
+    forward: Forward, first: tuple[str, JudgedSet], second: tuple[str, JudgedSet]
 ) -> NextTouch | None:
     """The base traced once more, which has moved or has not; None where neither says that it has."""
     one, other = (_meant(forward, c).onset for _, c in (first, second))
@@ -132,19 +132,19 @@ def _retrace(
     return _on_the_support(forward, first, second, "retrace", moved / RETRACED_M, why) if moved > 0 else None
 
 
-def _meant(forward: Forward, candidate: Candidate) -> Settings:
+def _meant(forward: Forward, candidate: JudgedSet) -> ForwardSettings:
     """What a candidate's effects set, its first touches aside."""
     return settings_of(forward, candidate.found.effects, candidate.found.values)
 
 
-def _both(first: tuple[str, Candidate], second: tuple[str, Candidate]) -> str:
+def _both(first: tuple[str, JudgedSet], second: tuple[str, JudgedSet]) -> str:
     return f"{first[0].replace('_', ' ')} from {second[0].replace('_', ' ')}"
 
 
 def _on_the_support(
     forward: Forward,
-    first: tuple[str, Candidate],
-    second: tuple[str, Candidate],
+    first: tuple[str, JudgedSet],
+    second: tuple[str, JudgedSet],
     kind: str,
     sigmas: float,
     why: str,

@@ -85,7 +85,7 @@ class Prior:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class FieldEstimate:
     """A field from presses.
 
     prior: the likeliest. gain: log likelihood by which it is likelier than places that scatter at random.
@@ -167,7 +167,7 @@ def views_of(shares: Shares, places: np.ndarray, lengths_m: np.ndarray) -> Views
     return Views(places, np.asarray(lengths_m, dtype=float), drawn, np.array(own))
 
 
-def estimate(log_modulus: np.ndarray, error: np.ndarray, site: np.ndarray, views: Views) -> Estimate:
+def estimate(log_modulus: np.ndarray, error: np.ndarray, site: np.ndarray, views: Views) -> FieldEstimate:
     """The likeliest field of presses whose own moduli are known.
 
     log_modulus: (p,) of each press, as if the object were of one modulus. error: (p,) standard error.
@@ -197,7 +197,7 @@ def estimate(log_modulus: np.ndarray, error: np.ndarray, site: np.ndarray, views
     apart = cover + nothing[1][0] ** 2 * np.eye(len(y))
     _, plain, plain_rest = _levelled(y, apart)
     left_out = rest / _left_out_weight(inverse)
-    return Estimate(
+    return FieldEstimate(
         Prior(float(log_sd), float(length), float(scatter)),
         float(likelihood - nothing[0]),
         np.unique(site),

@@ -16,7 +16,7 @@ _SHOWN = 60
 
 
 @dataclass(frozen=True)
-class Key:
+class FileKey:
     """One key: its type, the values allowed, and how many where it is a list (0: as many as one likes).
 
     unknown: nan and inf are allowed, for what nobody knows.
@@ -78,7 +78,7 @@ class Listed:
 
 ANY = None
 """A key whose value is not checked."""
-Schema = Mapping[str, "Key | Named | Listed | Schema | None"]
+Schema = Mapping[str, "FileKey | Named | Listed | Schema | None"]
 
 
 def span(low: float, high: float, unit: str) -> str:
@@ -126,13 +126,13 @@ def _faults(table: Any, schema: Schema, where: tuple[str, ...]) -> Iterator[tupl
     below: list[tuple[str, int]] = []
     for key, form in schema.items():
         if key not in table:
-            if isinstance(form, Key) and form.required:
+            if isinstance(form, FileKey) and form.required:
                 meant = near(key, tuple(k for k in table if k not in schema))
                 hint = f" (is {meant!r} meant for it?)" if meant else ""
                 yield f"{_at(name, where)}{key} is missing{hint}: it must be {form.words}", _GRAVE
             continue
         value = table[key]
-        if isinstance(form, Key):
+        if isinstance(form, FileKey):
             if not form.takes(value):
                 yield f"{_at(name, where)}{key} = {_shown(value)}; it must be {form.words}", _GRAVE
         elif isinstance(form, Named):

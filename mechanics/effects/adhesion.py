@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.law import Law
-from palpate.mechanics.effects.settings import Scene, Touch
+from palpate.mechanics.effects.law import PathLaw
+from palpate.mechanics.effects.settings import TouchedScene, TouchTerms
 from palpate.mechanics.kernels import kernel
 from palpate.mechanics.model.model import Model
 
@@ -45,10 +45,10 @@ def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):
         force[k] -= pull * normal[k]
 
 
-LAW = Law(_step, order=2, sharp=True, reach=lambda numbers: float(numbers[1]))
+LAW = PathLaw(_step, order=2, sharp=True, reach=lambda numbers: float(numbers[1]))
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     pull, reach, inside = float(keys["pull_off_n"]), float(keys["range_m"]), float(keys.get("inside", 0.0))
     check(
         pull >= 0 and reach > 0 and 0 <= inside <= 1,
@@ -58,7 +58,7 @@ def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     touch.numbers[LAW] = np.array([pull, reach, inside, _TURN_INSIDE * model.tool.tip_radius_m])
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     return {"pull_off_n": float(values[0]), "range_m": float(values[1]), "inside": float(values[2])}
 
 
@@ -73,9 +73,9 @@ EFFECT = Effect(
         Parameter("inside", "1", 0.0, 1.0, 0.0, (0.1, 0.3, 0.9), 0.05),
     ),
     keys={
-        "pull_off_n": Key(low=0.0, high=100.0, unit="N", required=True),
-        "range_m": Key(low=1e-6, high=0.1, unit="m", required=True),
-        "inside": Key(low=0.0, high=1.0),
+        "pull_off_n": FileKey(low=0.0, high=100.0, unit="N", required=True),
+        "range_m": FileKey(low=1e-6, high=0.1, unit="m", required=True),
+        "inside": FileKey(low=0.0, high=1.0),
     },
     report=_report,
     touch=_touch,

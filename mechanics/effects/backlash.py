@@ -7,14 +7,14 @@ not taken off a recording: the tip's side of the play is not known in free air.
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.recording.side_of_play import play
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     width, frame = values[0], scene.places.frame[scene.press]
     if width <= 0:
         # the hand moves the tip and the reading follows once the play is taken up
@@ -39,7 +39,7 @@ EFFECT = Effect(
     scope=Scope.TIME,
     words="a constant play lies between the tip and the position sensor",
     parameters=(Parameter("width_m", "m", -2e-3, 2e-3, 0.0, (1e-4, 4e-4, -1e-4, -4e-4), 2e-5),),
-    keys={"width_m": Key(low=0.0, high=0.1, unit="m", required=True)},
+    keys={"width_m": FileKey(low=0.0, high=0.1, unit="m", required=True)},
     report=lambda values, scene, modulus_pa: {"width_m": abs(float(values[0]))},
     change=_change,
     hints=SearchHints(

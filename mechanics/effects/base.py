@@ -15,8 +15,8 @@ import numpy as np
 
 from palpate.mechanics.disk.schema import ANY, Schema
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.law import Law
-from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.effects.law import PathLaw
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import Recording
@@ -93,15 +93,15 @@ class Effect:
     scope: Scope
     words: str
     parameters: tuple[Parameter, ...]
-    report: Callable[[np.ndarray, Scene, float], dict[str, Any]]
+    report: Callable[[np.ndarray, TouchedScene, float], dict[str, Any]]
     keys: Schema | None = ANY
     plain_words: str = ""
     keys_in_words: Callable[[Keys], str] | None = None
     role: Role = Role.SEARCHED
-    touch: Callable[[Touch, Keys, Model], None] | None = None
-    change: Callable[[Settings, np.ndarray, Scene], None] | None = None
-    of_material: Callable[[Touch, Model], None] | None = None
-    law: Law | None = None
+    touch: Callable[[TouchTerms, Keys, Model], None] | None = None
+    change: Callable[[ForwardSettings, np.ndarray, TouchedScene], None] | None = None
+    of_material: Callable[[TouchTerms, Model], None] | None = None
+    law: PathLaw | None = None
     apply: Callable[[Model, Keys], Model] | None = None
     hold: Callable[[Keys, float], dict[str, Any]] | None = None
     correct: Callable[[Recording, Keys], Recording] | None = None
@@ -138,7 +138,7 @@ class Effect:
             for i in range(count)
         ]
 
-    def act(self, settings: Settings, values: np.ndarray, scene: Scene) -> None:
+    def act(self, settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
         """Set what a prediction needs for these values (k,), in place."""
         if self.change is not None:
             self.change(settings, values, scene)
@@ -146,7 +146,7 @@ class Effect:
             keys = self.report(values, scene, settings.modulus)
             self.touch(settings.touch, keys, scene.places.model)
 
-    def set_touch(self, touch: Touch, keys: Keys, model: Model) -> None:
+    def set_touch(self, touch: TouchTerms, keys: Keys, model: Model) -> None:
         """Set what a tip feels for these keys; raises ModelError where they are missing or impossible."""
         if self.touch is None:
             return
@@ -172,7 +172,7 @@ def unchanged(model: Model, keys: Keys) -> Model:
     return model
 
 
-def no_keys(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def no_keys(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     """The `report` of an effect without parameters."""
     return {}
 

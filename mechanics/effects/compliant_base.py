@@ -5,29 +5,29 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.compliance.support_motion import far_on_springs
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 
 _FELT = 1.5e-3  # share of the object's height that counts as no compliance
 
 
-def _springs(values: np.ndarray, scene: Scene, modulus_pa: float) -> tuple[float, float]:
+def _springs(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> tuple[float, float]:
     """(normal, tangential) stiffness a unit of area, Pa/m."""
     compliance, ratio = np.exp(values)
     normal = modulus_pa / (compliance * float(scene.places.height.max()))
     return float(normal), float(normal * ratio)
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     if np.exp(values[0]) < _FELT:
         return
     springs = [k / settings.modulus for k in _springs(values, scene, settings.modulus)]
     settings.far = settings.far - scene.places.far + far_on_springs(scene.places, *springs)
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     normal, tangential = _springs(values, scene, modulus_pa)
     return {"k_normal_pa_per_m": normal, "k_tangential_pa_per_m": tangential}
 
@@ -47,8 +47,8 @@ EFFECT = Effect(
         Parameter("log_tangential", "ln 1", -2.5, 1.0, -0.5, (-0.5, -0.5), 0.05, 0.7),
     ),
     keys={
-        "k_normal_pa_per_m": Key(low=1.0, high=1e15, unit="Pa/m", required=True),
-        "k_tangential_pa_per_m": Key(low=1.0, high=1e15, unit="Pa/m", required=True),
+        "k_normal_pa_per_m": FileKey(low=1.0, high=1e15, unit="Pa/m", required=True),
+        "k_tangential_pa_per_m": FileKey(low=1.0, high=1e15, unit="Pa/m", required=True),
     },
     report=_report,
     change=_change,

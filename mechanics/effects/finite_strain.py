@@ -4,17 +4,17 @@ depth."""
 import numpy as np
 
 from palpate.mechanics.effects.base import Effect, Keys, Role, Scope, no_keys
-from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
 from palpate.mechanics.model.model import Model
 
 LAW = "neo-hookean"
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.touch.dent_law = LAW
 
 
-def _of_material(touch: Touch, model: Model) -> None:
+def _of_material(touch: TouchTerms, model: Model) -> None:
     touch.dent_law = model.material.dent_law
 
 

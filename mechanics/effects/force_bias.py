@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
-from palpate.mechanics.effects.settings import SHIFTED, Scene, Settings
+from palpate.mechanics.effects.settings import SHIFTED, ForwardSettings, TouchedScene
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.mechanics.recording.recording import Recording
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.read(SHIFTED, lambda force: force + values)
 
 
@@ -23,7 +23,7 @@ EFFECT = Effect(
     scope=Scope.READING,
     words="the force sensor does not read zero in free air",
     parameters=tuple(Parameter(f"bias_{a}_n", "N", -2.0, 2.0, 0.0, (0.0,), 0.005) for a in "xyz"),
-    keys={"bias_n": Key(low=-1e3, high=1e3, size=3, unit="N", required=True)},
+    keys={"bias_n": FileKey(low=-1e3, high=1e3, size=3, unit="N", required=True)},
     report=lambda values, scene, modulus_pa: {"bias_n": [float(v) for v in values]},
     role=Role.FREE_AIR,
     change=_change,

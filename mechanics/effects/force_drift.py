@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
-from palpate.mechanics.effects.settings import SHIFTED, Scene, Settings
+from palpate.mechanics.effects.settings import SHIFTED, ForwardSettings, TouchedScene
 from palpate.mechanics.recording.recording import Recording
 
 
@@ -15,7 +15,7 @@ def drifted(t: np.ndarray, rate_n_per_s: np.ndarray) -> np.ndarray:
     return t[:, None] * np.asarray(rate_n_per_s, dtype=float)
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.read(SHIFTED, lambda force: force + drifted(scene.t, values))
 
 
@@ -30,7 +30,7 @@ EFFECT = Effect(
     scope=Scope.READING,
     words="the zero of the force sensor drifts",
     parameters=tuple(Parameter(f"rate_{a}_n_per_s", "N/s", -0.02, 0.02, 0.0, (0.0,), 1e-4) for a in "xyz"),
-    keys={"rate_n_per_s": Key(low=-1e3, high=1e3, size=3, unit="N/s", required=True)},
+    keys={"rate_n_per_s": FileKey(low=-1e3, high=1e3, size=3, unit="N/s", required=True)},
     report=lambda values, scene, modulus_pa: {"rate_n_per_s": [float(v) for v in values]},
     role=Role.FREE_AIR,
     change=_change,

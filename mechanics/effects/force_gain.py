@@ -5,12 +5,12 @@ import numpy as np
 from palpate.mechanics.disk.schema import ANY
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import MIXED, Scene, Settings
+from palpate.mechanics.effects.settings import MIXED, ForwardSettings, TouchedScene
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.mechanics.recording.recording import Recording
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.read(MIXED, lambda force: force @ values.reshape(3, 3).T)
 
 

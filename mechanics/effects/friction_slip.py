@@ -6,10 +6,10 @@ it, a secant step on what is too much; renderer and prediction take the same wal
 
 from __future__ import annotations
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.kernels import kernel
 from palpate.mechanics.model.model import Model
 
@@ -43,7 +43,7 @@ def slip_length(slip, excess, before, length, compliance, lever):
     return CAUTION * compliance * excess / lever
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     mu = float(keys["mu"])
     check(mu >= 0, "friction_slip", "mu at least 0")
     touch.friction = mu
@@ -55,7 +55,7 @@ EFFECT = Effect(
     scope=Scope.PRESS,
     words="the tip slides instead of sticking",
     parameters=(Parameter("mu", "1", 0.005, 1.5, 1.5, (0.05, 0.15, 0.4), 0.01),),
-    keys={"mu": Key(low=0.0, high=100.0, required=True)},
+    keys={"mu": FileKey(low=0.0, high=100.0, required=True)},
     report=lambda values, scene, modulus_pa: {"mu": float(values[0])},
     touch=_touch,
     apply=unchanged,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.mechanics.effects.settings import Scene
+from palpate.mechanics.effects.settings import TouchedScene
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class SearchHints:
     """
 
     candidates: Callable[[], list[np.ndarray]] | None = None
-    seek: Callable[[Scene, Misfit], list[np.ndarray]] | None = None
-    refine: Callable[[Scene, np.ndarray], None] | None = None
+    seek: Callable[[TouchedScene, Misfit], list[np.ndarray]] | None = None
+    refine: Callable[[TouchedScene, np.ndarray], None] | None = None
     few_places: bool = False
     shape_rival: bool = False
     any_form: bool = False

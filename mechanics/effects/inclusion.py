@@ -22,7 +22,7 @@ from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sit
 from palpate.mechanics.contact.edges import edge_law
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import Misfit, SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.model.material import BALL, Ball
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.shape.nearest import closest
@@ -91,13 +91,13 @@ def first_order(values: np.ndarray, places: Places) -> np.ndarray:
     return known[key].copy()
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     change = first_order(values, scene.places)
     scale = scene.places.stages.get(_SCALE)
     settings.far = settings.far + (change if scale is None else change * scale[:, None, None])
 
 
-def _refine(scene: Scene, values: np.ndarray) -> None:
+def _refine(scene: TouchedScene, values: np.ndarray) -> None:
     """Hold how much the ball changes each place, where a mesh fine around it is solved, over what first order
     says, (p,)."""
     places, first = scene.places, first_order(values, scene.places)[:, 0, 0]
@@ -129,7 +129,7 @@ def ball_of(values: np.ndarray, places: Places) -> Ball:
     return Ball((x, y, z), radius, float(np.exp(log_ratio)))
 
 
-def _seek(scene: Scene, misfit: Misfit) -> list[np.ndarray]:
+def _seek(scene: TouchedScene, misfit: Misfit) -> list[np.ndarray]:
     """Balls on a grid inside the object, ranked by how well they explain the places' stiffness.
 
     First order: the share of each place's compliance that lies in the ball, times how its force answers to
@@ -183,7 +183,7 @@ def _log_ratio(change: float) -> float:
     return float(grid[np.argmin([abs(softness(np.exp(g)) - 1 - change) for g in grid])])
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     ball = ball_of(values, scene.places)
     return {
         "centre_m": list(ball.centre_m),

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.law import Law
-from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.effects.law import PathLaw
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
 from palpate.mechanics.kernels import kernel
 from palpate.mechanics.model.model import Model
 
@@ -120,7 +120,7 @@ def _reach(numbers: np.ndarray) -> float:
     return float((_OBJECT_GIVES * neck + numbers[4]) * numbers[5])
 
 
-LAW = Law(jkr_step, order=2, memory=lambda numbers: 4, reach=_reach)
+LAW = PathLaw(jkr_step, order=2, memory=lambda numbers: 4, reach=_reach)
 
 
 def edge_share(work: float, range_m: float, plane_strain_pa: float, radius_m: float) -> float:
@@ -135,7 +135,7 @@ def edge_share(work: float, range_m: float, plane_strain_pa: float, radius_m: fl
     return float(with_maugis / (1 + with_maugis))
 
 
-def _set(touch: Touch, keys: Keys, modulus_pa: float, poisson_ratio: float, radius: float) -> None:
+def _set(touch: TouchTerms, keys: Keys, modulus_pa: float, poisson_ratio: float, radius: float) -> None:
     work, healed, reach = (float(keys[name]) for name in ("work_j_per_m2", "healed", "range_m"))
     check(
         work >= 0 and 0 <= healed <= 1 and reach > 0,
@@ -152,17 +152,17 @@ def _set(touch: Touch, keys: Keys, modulus_pa: float, poisson_ratio: float, radi
     )  # fmt: skip
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     material = model.material
     _set(touch, keys, material.young_modulus_pa, material.poisson_ratio, model.tool.tip_radius_m)
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     keys = _report(values, scene, settings.modulus)
     _set(settings.touch, keys, settings.modulus, settings.nu, scene.places.model.tool.tip_radius_m)
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     radius = scene.places.model.tool.tip_radius_m
     return {
         "work_j_per_m2": float(values[0] * modulus_pa * radius),
@@ -182,9 +182,9 @@ EFFECT = Effect(
         Parameter("range_over_r", "1", 1e-6, 0.5, 0.01, (0.01, 0.01, 0.01, 0.1), 0.005),
     ),
     keys={
-        "work_j_per_m2": Key(low=0.0, high=1e4, unit="J/m^2", required=True),
-        "healed": Key(low=0.0, high=1.0, required=True),
-        "range_m": Key(low=1e-12, high=0.1, unit="m", required=True),
+        "work_j_per_m2": FileKey(low=0.0, high=1e4, unit="J/m^2", required=True),
+        "healed": FileKey(low=0.0, high=1.0, required=True),
+        "range_m": FileKey(low=1e-12, high=0.1, unit="m", required=True),
     },
     report=_report,
     touch=_touch,

@@ -10,7 +10,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
-class Law:
+class PathLaw:
     """What an effect does to the force along the path of a touch; compiled, allocates nothing.
 
     step(numbers, memory, depth, deepest, load, most, dt, normal, force): changes force (3,) N on the tool in

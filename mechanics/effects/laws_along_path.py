@@ -11,12 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.law import PathLaw
 from palpate.mechanics.effects.registry import effects
-from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.kernels import fresh_part
 
-LAWS: tuple[Law, ...] = tuple(sorted((e.law for e in effects() if e.law is not None), key=lambda x: x.order))
+LAWS: tuple[PathLaw, ...] = tuple(
+    sorted((e.law for e in effects() if e.law is not None), key=lambda x: x.order)
+)
 """In the order in which they follow one another."""
 
 
@@ -30,7 +32,7 @@ class PathNumbers(NamedTuple):
     memory: np.ndarray
 
 
-def path_numbers(touch: Touch) -> PathNumbers:
+def path_numbers(touch: TouchTerms) -> PathNumbers:
     """The kernels' numbers of a touch."""
     own = touch.numbers
     numbers = np.zeros((len(LAWS), 1 + max((len(v) for v in own.values()), default=0)))

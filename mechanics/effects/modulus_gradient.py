@@ -7,7 +7,7 @@ import numpy as np
 from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.model.material import GRADIENT, Gradient, gradient_ratio, height_share
 from palpate.mechanics.model.model import Model
 
@@ -18,7 +18,7 @@ def gradient(log_ratio: float) -> Gradient:
     return Gradient(float(base), float(2 - base))
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     places, model = scene.places, scene.places.model
     height = places.stage(
         "height share", lambda: height_share(model.mesh, model.support.point, model.support.normal)
@@ -31,7 +31,7 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.dent_ratio = settings.dent_ratio / softness
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     found = gradient(values[0])
     return {"ratio_base": found.ratio_base, "ratio_top": found.ratio_top}
 

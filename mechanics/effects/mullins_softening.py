@@ -11,10 +11,10 @@ import math
 import numpy as np
 
 from palpate.mechanics.contact.dent import dent_load
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
-from palpate.mechanics.effects.law import Law
-from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.law import PathLaw
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.kernels import kernel
 from palpate.mechanics.model.model import Model
 
@@ -36,7 +36,7 @@ def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):
         force[k] *= factor
 
 
-LAW = Law(_step, order=0, reads_load=True)
+LAW = PathLaw(_step, order=0, reads_load=True)
 
 
 def greatest_load(model: Model) -> float:
@@ -45,7 +45,7 @@ def greatest_load(model: Model) -> float:
     return float(dent_load(max(depths, default=model.tool.tip_radius_m)))
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     r, m_rel = float(keys["r"]), float(keys["m_rel"])
     check(r >= 1 and m_rel > 0, "mullins_softening", "r at least 1, m_rel greater than 0")
     touch.numbers[LAW] = np.array([r, m_rel * greatest_load(model)])
@@ -61,8 +61,8 @@ EFFECT = Effect(
         Parameter("m_rel", "1", 0.01, 2.0, 0.3, (0.1, 0.4), 0.02),
     ),
     keys={
-        "r": Key(low=1.0, high=1e9, required=True),
-        "m_rel": Key(low=1e-6, high=1e3, required=True),
+        "r": FileKey(low=1.0, high=1e9, required=True),
+        "m_rel": FileKey(low=1e-6, high=1e3, required=True),
     },
     report=lambda values, scene, modulus_pa: {
         "r": float(1 / max(values[0], _NONE)),

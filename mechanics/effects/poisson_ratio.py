@@ -7,12 +7,12 @@ import numpy as np
 from palpate.mechanics.compliance.far_field import bracing_at_poisson, far_at_poisson
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.quantities import POISSON_RATIO
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.nu = float(values[0])
     settings.far = settings.far - scene.places.far + far_at_poisson(scene.places, settings.nu)
     settings.bracing = bracing_at_poisson(scene.places, settings.nu)

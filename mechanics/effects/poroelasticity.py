@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.law import Law
-from palpate.mechanics.effects.settings import Scene, Touch
+from palpate.mechanics.effects.law import PathLaw
+from palpate.mechanics.effects.settings import TouchedScene, TouchTerms
 from palpate.mechanics.effects.viscoelasticity import changed, let_go, recall
 from palpate.mechanics.kernels import kernel
 from palpate.mechanics.model.model import Model
@@ -40,10 +40,10 @@ def poroelastic_step(numbers, memory, depth, deepest, load, most, dt, normal, fo
     let_go(normal, force)
 
 
-LAW = Law(poroelastic_step, order=1, memory=lambda numbers: 6 + 3 * _TERMS)
+LAW = PathLaw(poroelastic_step, order=1, memory=lambda numbers: 6 + 3 * _TERMS)
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     share, diffusivity = float(keys["share"]), float(keys["diffusivity_m2_per_s"])
     check(
         share >= 0 and diffusivity > 0,
@@ -53,7 +53,7 @@ def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     touch.numbers[LAW] = np.array([share, diffusivity / model.tool.tip_radius_m])
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     # the rate of a contact as wide as the tip is what a fit tells, at any scale
     diffusivity = float(np.exp(values[1])) * scene.tip_radius**2
     return {"share": float(values[0]), "diffusivity_m2_per_s": diffusivity}
@@ -85,8 +85,8 @@ EFFECT = Effect(
         ),
     ),
     keys={
-        "share": Key(low=0.0, high=10.0, required=True),
-        "diffusivity_m2_per_s": Key(low=1e-16, high=1.0, unit="m^2/s", required=True),
+        "share": FileKey(low=0.0, high=10.0, required=True),
+        "diffusivity_m2_per_s": FileKey(low=1e-16, high=1.0, unit="m^2/s", required=True),
     },
     report=_report,
     keys_in_words=_in_words,

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Touch
+from palpate.mechanics.effects.settings import TouchedScene, TouchTerms
 from palpate.mechanics.effects.viscoelasticity import add_terms
 from palpate.mechanics.model.model import Model
 
@@ -39,7 +39,7 @@ def prony_terms(share: float, exponent: float) -> tuple[np.ndarray, np.ndarray]:
     return share * np.array(_weights(float(exponent))), TAU_S
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     share, exponent = float(keys["share"]), float(keys["exponent"])
     check(
         share >= 0 and 0 < exponent < 1,
@@ -55,7 +55,7 @@ def _in_words(keys: Keys) -> str:
     return f"extra force after a fast press: {100 * share:.0f} % after 1 s, {100 * later:.0f} % after 10 s"
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     return {"share": float(values[0]), "exponent": float(values[1])}
 
 
@@ -69,8 +69,8 @@ EFFECT = Effect(
         Parameter("exponent", "1", 0.02, 0.9, 0.25, (0.2, 0.3, 0.35, 0.35), 0.01, 0.3),
     ),
     keys={
-        "share": Key(low=0.0, high=1e3, required=True),
-        "exponent": Key(low=1e-3, high=0.999, required=True),
+        "share": FileKey(low=0.0, high=1e3, required=True),
+        "exponent": FileKey(low=1e-3, high=0.999, required=True),
     },
     report=_report,
     keys_in_words=_in_words,

@@ -10,13 +10,13 @@ import numpy as np
 
 from palpate.mechanics.compliance.pressed_places import Places
 from palpate.mechanics.contact.dent import DentLaw, dent_law
-from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.law import PathLaw
 
 STICKS = float("inf")
 
 
 @dataclass
-class Touch:
+class TouchTerms:
     """What one tip feels where it touches; prediction and renderer read it.
 
     dent_law: name of the dent's law; factors: functions of Poisson's ratio that give the factors on its
@@ -28,7 +28,7 @@ class Touch:
     factors: list[Callable[[float], tuple[np.ndarray, np.ndarray]]] = field(default_factory=list)
     tip_ratio: float = 1.0
     friction: float = STICKS
-    numbers: dict[Law, np.ndarray] = field(default_factory=dict)
+    numbers: dict[PathLaw, np.ndarray] = field(default_factory=dict)
 
     def law_of_dent(self, poisson_ratio: float) -> DentLaw:
         """The dent's law at this friction, with all factors."""
@@ -39,7 +39,7 @@ class Touch:
 
 
 @dataclass
-class Settings:
+class ForwardSettings:
     """The settings of a prediction; the defaults are the ideal model.
 
     modulus: Pa. nu: Poisson's ratio. far: (p, 3, 3) local, unit modulus. bracing: (p,) 1/m. dent_ratio: (p,)
@@ -57,7 +57,7 @@ class Settings:
     dent_ratio: np.ndarray
     onset: np.ndarray
     stiffness: np.ndarray
-    touch: Touch = field(default_factory=Touch)
+    touch: TouchTerms = field(default_factory=TouchTerms)
     tool_compliance: float = 0.0
     unsure_m: np.ndarray | None = None
     moves: list[Callable[[np.ndarray], np.ndarray]] = field(default_factory=list)
@@ -76,7 +76,7 @@ LATE, WEIGHED, MIXED, SHIFTED = range(4)
 """What an instrument does to a force, in order: reads it late, adds the tool, mixes axes, shifts its zero."""
 
 
-class Scene(Protocol):
+class TouchedScene(Protocol):
     """What effects see of a recording's presses: p presses, n samples.
 
     places: the pressed places. start: (p + 1,) rows of each press. t: (n,) s, the recording's clock. press:

@@ -15,7 +15,7 @@ from palpate.mechanics.compliance.far_field import energy_fields, far_with_weigh
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
 from palpate.mechanics.model.material import SKIN, Skin
 from palpate.mechanics.model.model import Model
 
@@ -40,7 +40,7 @@ _FAR_SHARE = 0.3
 """Of the change that the elements' energies say: what lies within the dent's own reach is no far field."""
 
 
-def _set(touch: Touch, skin: Skin, model: Model) -> None:
+def _set(touch: TouchTerms, skin: Skin, model: Model) -> None:
     contact = model.tool.tip_radius_m * np.sqrt(np.maximum(grid(), 1e-6))
 
     def factors(poisson_ratio: float) -> tuple[np.ndarray, np.ndarray]:
@@ -50,16 +50,16 @@ def _set(touch: Touch, skin: Skin, model: Model) -> None:
     touch.factors.append(factors)
 
 
-def _of_material(touch: Touch, model: Model) -> None:
+def _of_material(touch: TouchTerms, model: Model) -> None:
     if model.material.skin is not None:
         _set(touch, model.material.skin, model)
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     return {"thickness_m": float(values[0]), "modulus_ratio": float(np.exp(values[1]))}
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     places, skin = scene.places, Skin(**_report(values, scene, settings.modulus))
     _set(settings.touch, skin, places.model)
     thickness, depth = skin.thickness_m, energy_fields(places).depth

@@ -26,10 +26,10 @@ from palpate.mechanics.compliance.smooth_field import (
     places_of,
     views_of,
 )
-from palpate.mechanics.disk.schema import ANY, Key
+from palpate.mechanics.disk.schema import ANY, FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import Misfit, SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.model.material import LENGTH
 from palpate.mechanics.model.model import Model
 
@@ -51,7 +51,7 @@ class Basis:
     elements: np.ndarray
 
 
-def _basis(scene: Scene) -> Basis:
+def _basis(scene: TouchedScene) -> Basis:
     places = scene.places
     p = len(places.point)
     return places.stage(_BASIS, lambda: _made(places, _USUAL, np.full(p, _USUAL_ANSWER_M), np.full(p, 1e3)))
@@ -76,7 +76,7 @@ def _places(places: Places) -> np.ndarray:
     return places_of(tips_of(places)[places.first], energy_fields(places).centroid)
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     places, basis = scene.places, _basis(scene)
     if not values.any():
         return
@@ -87,7 +87,7 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.dent_ratio = settings.dent_ratio * dent_ratio
 
 
-def _seek(scene: Scene, misfit: Misfit) -> list[np.ndarray]:
+def _seek(scene: TouchedScene, misfit: Misfit) -> list[np.ndarray]:
     """The likeliest field of what the presses' stiffness is off by; and from now on its patterns."""
     places = scene.places
     answer = np.maximum(-misfit.answer, 0.0)
@@ -119,7 +119,7 @@ def keys_of(field: SmoothField) -> dict[str, Any]:
     }
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     basis = _basis(scene)
     return keys_of(SmoothField(basis.places, values @ basis.patterns, basis.prior.length_m))
 
@@ -150,7 +150,7 @@ EFFECT = Effect(
     ),
     keys={
         "places_m": ANY,
-        "ratio": Key(low=1e-3, high=1e3, size=0, required=True),
+        "ratio": FileKey(low=1e-3, high=1e3, size=0, required=True),
         "length_m": LENGTH,
     },
     report=_report,

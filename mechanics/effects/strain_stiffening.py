@@ -19,10 +19,10 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from palpate.mechanics.contact.dent import grid
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.model.model import Model
 
 FAMILY = Path(__file__).parents[1] / "contact" / "dent_stiffening.csv"
@@ -67,7 +67,7 @@ def stiffening(c20_over_c10: float) -> tuple[np.ndarray, np.ndarray]:
     return force, sideways
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     ratio = float(keys["c20_over_c10"])
     touch.factors.append(lambda poisson_ratio: stiffening(ratio))
 
@@ -78,7 +78,7 @@ EFFECT = Effect(
     scope=Scope.EVERYWHERE,
     words="the material stiffens or softens as it is strained",
     parameters=(Parameter("c20_over_c10", "1", LEAST, GREATEST, 0.0, (0.3, -0.05), 0.02),),
-    keys={"c20_over_c10": Key(low=LEAST, high=GREATEST, required=True)},
+    keys={"c20_over_c10": FileKey(low=LEAST, high=GREATEST, required=True)},
     report=lambda values, scene, modulus_pa: {"c20_over_c10": float(values[0])},
     touch=_touch,
     apply=unchanged,

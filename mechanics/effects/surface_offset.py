@@ -5,13 +5,13 @@ The model's surface is wrong then, and this says where it was, not what it shoul
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     point, normal = scene.places.point, scene.places.normal
     move = values[:3] + np.cross(values[3:], point - point.mean(axis=0))
     settings.onset = settings.onset + np.einsum("pi,pi->p", normal, move)
@@ -27,8 +27,8 @@ EFFECT = Effect(
         *(Parameter(f"rotation_{a}_rad", "rad", -0.15, 0.15, 0.0, (0.0,), 1e-3, 0.03) for a in "xyz"),
     ),
     keys={
-        "shift_m": Key(low=-1.0, high=1.0, size=3, unit="m", required=True),
-        "rotation_rad": Key(low=-4.0, high=4.0, size=3, unit="rad", required=True),
+        "shift_m": FileKey(low=-1.0, high=1.0, size=3, unit="m", required=True),
+        "rotation_rad": FileKey(low=-4.0, high=4.0, size=3, unit="rad", required=True),
     },
     report=lambda values, scene, modulus_pa: {
         "shift_m": [float(v) for v in values[:3]],

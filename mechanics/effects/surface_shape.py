@@ -6,7 +6,7 @@ by more than their shape's uncertainty and nothing else explains how. What the s
 say, so it is not rendered.
 """
 
-from palpate.mechanics.disk.schema import ANY, Key
+from palpate.mechanics.disk.schema import ANY, FileKey
 from palpate.mechanics.effects.base import Effect, Role, Scope, no_keys
 
 EFFECT = Effect(
@@ -15,7 +15,7 @@ EFFECT = Effect(
     scope=Scope.PLACES,
     words="the reconstructed shape is wrong where nobody touched",
     parameters=(),
-    keys={"rms_m": Key(low=0.0, high=1.0, unit="m"), "where": ANY},
+    keys={"rms_m": FileKey(low=0.0, high=1.0, unit="m"), "where": ANY},
     report=no_keys,
     role=Role.REST,
 )

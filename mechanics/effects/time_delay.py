@@ -3,16 +3,16 @@ place."""
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import LATE, Scene, Settings
+from palpate.mechanics.effects.settings import LATE, ForwardSettings, TouchedScene
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import delayed
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     parts = [slice(a, b) for a, b in zip(scene.start[:-1], scene.start[1:], strict=True)]
     settings.read(LATE, lambda force: delayed(parts, scene.t, force, values[0]))
 
@@ -27,7 +27,7 @@ EFFECT = Effect(
     scope=Scope.TIME,
     words="the force is read later than the position",
     parameters=(Parameter("delay_s", "s", -0.08, 0.08, 0.0, (0.01, -0.01), 0.002),),
-    keys={"delay_s": Key(low=-10.0, high=10.0, unit="s", required=True)},
+    keys={"delay_s": FileKey(low=-10.0, high=10.0, unit="s", required=True)},
     report=lambda values, scene, modulus_pa: {"delay_s": float(values[0])},
     change=_change,
     correct=_correct,

@@ -1,13 +1,13 @@
 """Tip radius: the sphere is not as large as stated; the dent's force goes with its square root."""
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.model.model import Model
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     radius = float(keys["tip_radius_m"])
     check(radius > 0, "tip_radius", "tip_radius_m greater than 0")
     touch.tip_ratio = radius / model.tool.tip_radius_m
@@ -19,7 +19,7 @@ EFFECT = Effect(
     scope=Scope.EVERYWHERE,
     words="the tip is larger or smaller than stated",
     parameters=(Parameter("ratio", "1", 0.4, 2.5, 1.0, (0.8, 1.25), 0.02),),
-    keys={"tip_radius_m": Key(low=1e-5, high=0.1, unit="m", required=True)},
+    keys={"tip_radius_m": FileKey(low=1e-5, high=0.1, unit="m", required=True)},
     report=lambda values, scene, modulus_pa: {"tip_radius_m": float(values[0] * scene.tip_radius)},
     touch=_touch,
     apply=unchanged,

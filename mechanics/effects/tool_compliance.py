@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.mechanics.recording.recording import Recording
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.tool_compliance = values[0]
 
 
@@ -24,7 +24,7 @@ EFFECT = Effect(
     scope=Scope.EVERYWHERE,
     words="the tool bends: the tip is not where the position sensor says",
     parameters=(Parameter("compliance_m_per_n", "m/N", 0.0, 0.01, 0.0, (5e-4,), 5e-5),),
-    keys={"stiffness_n_per_m": Key(low=1.0, high=1e12, unit="N/m", required=True)},
+    keys={"stiffness_n_per_m": FileKey(low=1.0, high=1e12, unit="N/m", required=True)},
     report=lambda values, scene, modulus_pa: {"stiffness_n_per_m": float(1 / np.maximum(values[0], 1e-9))},
     change=_change,
     correct=_correct,

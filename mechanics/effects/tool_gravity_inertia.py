@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import WEIGHED, Scene, Settings
+from palpate.mechanics.effects.settings import WEIGHED, ForwardSettings, TouchedScene
 from palpate.mechanics.recording.kinematics import acceleration
 from palpate.mechanics.recording.recording import Recording
 
@@ -27,7 +27,7 @@ def left_by_tare(weight_n: np.ndarray, quaternion: np.ndarray | None, share: flo
     return weight_n - (1 - share) * turn.apply(turn[0].inv().apply(weight_n))
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     mass, share = values
     weight = -mass * STANDARD_GRAVITY * scene.places.model.support.normal
     added = left_by_tare(weight, scene.quaternion, share) - mass * scene.acceleration
@@ -50,7 +50,7 @@ EFFECT = Effect(
         Parameter("mass_kg", "kg", 0.0, 1.0, 0.0, (0.02, 0.02), 0.002),
         Parameter("weight_share", "1", 0.0, 1.0, 0.0, (0.0, 1.0), 0.05),
     ),
-    keys={"mass_kg": Key(low=-5.0, high=5.0, unit="kg", required=True), "tared": Key(bool)},
+    keys={"mass_kg": FileKey(low=-5.0, high=5.0, unit="kg", required=True), "tared": FileKey(bool)},
     report=lambda values, scene, modulus_pa: {"mass_kg": float(values[0]), "tared": bool(values[1] < 0.5)},
     role=Role.FREE_AIR,
     change=_change,

@@ -5,18 +5,18 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.compliance.support_motion import ANGLES, far_partly_bonded
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import Scene, Settings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.frames import tangents
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.far = settings.far - scene.places.far + far_partly_bonded(scene.places, *values)
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     across, along = tangents(scene.places.model.support.normal)
     direction = np.cos(values[1]) * across + np.sin(values[1]) * along
     return {"bonded_fraction": float(1 - values[0]), "direction": [float(v) for v in direction]}
@@ -42,8 +42,8 @@ EFFECT = Effect(
         Parameter("floor", "1", 0.0, 1.0, 1.0, (1.0,), 0.05, 0.7),
     ),
     keys={
-        "bonded_fraction": Key(low=1e-3, high=1.0, required=True),
-        "direction": Key(low=-1e3, high=1e3, size=3, required=True),
+        "bonded_fraction": FileKey(low=1e-3, high=1.0, required=True),
+        "direction": FileKey(low=-1e3, high=1e3, size=3, required=True),
     },
     report=_report,
     change=_change,

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.law import Law
-from palpate.mechanics.effects.settings import Scene, Settings, Touch
+from palpate.mechanics.effects.law import PathLaw
+from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.kernels import kernel
 from palpate.mechanics.model.model import Model
@@ -64,16 +64,16 @@ def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     let_go(normal, force)
 
 
-LAW = Law(prony_step, order=1, memory=lambda numbers: 6 + 3 * (len(numbers) // 2))
+LAW = PathLaw(prony_step, order=1, memory=lambda numbers: 6 + 3 * (len(numbers) // 2))
 
 
-def add_terms(touch: Touch, g: np.ndarray, tau_s: np.ndarray) -> None:
+def add_terms(touch: TouchTerms, g: np.ndarray, tau_s: np.ndarray) -> None:
     """Let a touch remember by further terms g, tau_s (k,), beside those that it has."""
     there = touch.numbers.get(LAW, np.zeros(0))
     touch.numbers[LAW] = np.concatenate([there, np.column_stack([g, tau_s]).ravel()])
 
 
-def _touch(touch: Touch, keys: Keys, model: Model) -> None:
+def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     g = np.atleast_1d(np.asarray(keys["g"], dtype=float))
     tau = np.atleast_1d(np.asarray(keys["tau_s"], dtype=float))
     if g.shape != tau.shape or not (tau > 0).all() or not (g >= 0).all():
@@ -84,12 +84,12 @@ def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     add_terms(touch, g, tau)
 
 
-def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     # a term too weak to be told is not reported, but a fit must see it grow
     _touch(settings.touch, {"g": values[[0, 2]], "tau_s": np.exp(values[[1, 3]])}, scene.places.model)
 
 
-def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
     pairs = sorted((float(np.exp(values[i + 1])), float(values[i])) for i in (0, 2) if values[i] > 0.005)
     return {"g": [g for _, g in pairs], "tau_s": [tau for tau, _ in pairs]}
 
@@ -129,8 +129,8 @@ EFFECT = Effect(
         ),
     ),
     keys={
-        "g": Key(low=0.0, high=100.0, size=0, required=True),
-        "tau_s": Key(low=1e-6, high=1e5, size=0, unit="s", required=True),
+        "g": FileKey(low=0.0, high=100.0, size=0, required=True),
+        "tau_s": FileKey(low=1e-6, high=1e5, size=0, unit="s", required=True),
     },
     report=_report,
     keys_in_words=_in_words,

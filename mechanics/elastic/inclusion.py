@@ -25,7 +25,7 @@ _PROBES = 240  # directions in which a change of a few centimetres is sought, be
 _MISSED = 1e-7
 
 
-class Region:
+class StiffenedElements:
     """Green's functions of some elements, for changing their moduli again and again.
 
     solver: of the unchanged object. elements: (e,) those that may change; `extend` adds to them. outputs:

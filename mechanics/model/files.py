@@ -23,7 +23,7 @@ import numpy as np
 
 from palpate.mechanics.contact.dent import dent_laws
 from palpate.mechanics.disk.reading import read_toml
-from palpate.mechanics.disk.schema import ANY, Key, Named, Schema, check_table
+from palpate.mechanics.disk.schema import ANY, FileKey, Named, Schema, check_table
 from palpate.mechanics.disk.store import read_arrays, write_arrays
 from palpate.mechanics.disk.toml_text import dump_toml
 from palpate.mechanics.disk.vtk_files import read_vtk, vtk_bytes
@@ -43,40 +43,40 @@ from palpate.mechanics.model.material import (
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
 from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
-from palpate.mechanics.recording.segments import KINDS, Segment
+from palpate.mechanics.recording.segments import KINDS, TimeSegment
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape
 
 FORMAT = 3
 """Of model.toml; no other is read. [end] is its last table: a file without it was cut off."""
 
-_COUNT = Key(int, low=1, high=10_000_000)
+_COUNT = FileKey(int, low=1, high=10_000_000)
 SCHEMA: Schema = {
-    "format": Key(int, low=FORMAT, high=FORMAT, required=True),
+    "format": FileKey(int, low=FORMAT, high=FORMAT, required=True),
     "material": {
         "young_modulus_pa": YOUNG_MODULUS,
-        "young_modulus_ci95_pa": Key(low=0.0, high=1e12, size=2, unit="Pa", unknown=True),
+        "young_modulus_ci95_pa": FileKey(low=0.0, high=1e12, size=2, unit="Pa", unknown=True),
         "poisson_ratio": dataclasses.replace(POISSON_RATIO, required=True),
-        "dent_law": Key(str, choices=dent_laws()),
+        "dent_law": FileKey(str, choices=dent_laws()),
         "gradient": GRADIENT,
         "skin": SKIN,
         "inclusions": Named(BALL),
     },
     "tool": {"tip_radius_m": TIP_RADIUS},
     "mesh": {
-        "nodes": Key(int, low=1, high=_COUNT.high, required=True),
+        "nodes": FileKey(int, low=1, high=_COUNT.high, required=True),
         "tetrahedra": _COUNT,
         "touchable_nodes": _COUNT,
-        "mesh_size_m": Key(low=1e-5, high=1.0, unit="m", required=True),
-        "element_order": Key(int, low=1, high=2),
+        "mesh_size_m": FileKey(low=1e-5, high=1.0, unit="m", required=True),
+        "element_order": FileKey(int, low=1, high=2),
     },
     "frame": {
         "support_point": PLACE,
-        "support_normal": Key(low=-1e6, high=1e6, size=3, required=True),
+        "support_normal": FileKey(low=-1e6, high=1e6, size=3, required=True),
     },
     "effects": ANY,
     "provenance": ANY,
-    "end": {"whole": Key(bool, required=True)},
+    "end": {"whole": FileKey(bool, required=True)},
 }
 """What model.toml may hold; further tables inform and are left alone. Each effect says its own keys."""
 SHAPE = "shape.vtp"
@@ -307,7 +307,7 @@ def read_presses(path: Path) -> Presses:
             **named,
             fits={n: np.array(arrays[f"fit {n}"]) for n in FITS},
             noise=Noise(*arrays["noise"].tolist()),
-            segments=tuple(Segment(KINDS[int(k)], a, b) for k, a, b in arrays["segments"].tolist()),
+            segments=tuple(TimeSegment(KINDS[int(k)], a, b) for k, a, b in arrays["segments"].tolist()),
             recording=bytes(arrays["recording"]).decode(),
         )
     except (CacheError, KeyError, ValueError, TypeError, IndexError) as error:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.contact.dent import dent_laws
-from palpate.mechanics.disk.schema import Key, Schema
+from palpate.mechanics.disk.schema import FileKey, Schema
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.quantities import POISSON_RATIO
 from palpate.mechanics.shape.nearest import distance
@@ -24,9 +24,9 @@ from palpate.mechanics.shape.tetmesh import TetMesh
 UNKNOWN = (float("nan"), float("nan"))
 """An interval that nobody estimated."""
 
-LENGTH = Key(low=1e-5, high=1.0, unit="m", required=True)
-RATIO = Key(low=1e-3, high=1e3, required=True)
-PLACE = Key(low=-10.0, high=10.0, size=3, unit="m", required=True)
+LENGTH = FileKey(low=1e-5, high=1.0, unit="m", required=True)
+RATIO = FileKey(low=1e-3, high=1e3, required=True)
+PLACE = FileKey(low=-10.0, high=10.0, size=3, unit="m", required=True)
 BALL: Schema = {"centre_m": PLACE, "radius_m": LENGTH, "modulus_ratio": RATIO}
 GRADIENT: Schema = {"ratio_base": RATIO, "ratio_top": RATIO}
 SKIN: Schema = {"thickness_m": LENGTH, "modulus_ratio": RATIO}

@@ -25,7 +25,7 @@ Fits = Mapping[str, np.ndarray]
 """Parameters of single presses by the name of their column."""
 
 
-class Law(NamedTuple):
+class OneDLaws(NamedTuple):
     """f = k u^r + b u^s du/dt of each palpation: all (n,); see `forces_of`."""
 
     k: np.ndarray
@@ -35,8 +35,8 @@ class Law(NamedTuple):
 
 
 def spread_law(
-    points: np.ndarray, site: np.ndarray, law: Law, at: np.ndarray, interpolation: str = "rbf"
-) -> Law:
+    points: np.ndarray, site: np.ndarray, law: OneDLaws, at: np.ndarray, interpolation: str = "rbf"
+) -> OneDLaws:
     """The law at places `at` (q, 3) m from presses at `points` (n, 3) m, of sites (n,); those with a NaN are
     left out.
 
@@ -61,7 +61,7 @@ def spread_law(
             values = RBFInterpolator(places, means, kernel="linear", degree=0)(at)
             values = np.clip(values, columns.min(axis=0), columns.max(axis=0))
     force, damping, r, s = values.T
-    return Law(force / u**r, damping / u**s, r, s)
+    return OneDLaws(force / u**r, damping / u**s, r, s)
 
 
 def _averaged(*arrays: np.ndarray, site: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -71,7 +71,7 @@ def _averaged(*arrays: np.ndarray, site: np.ndarray) -> tuple[np.ndarray, ...]:
     return tuple(np.column_stack([np.bincount(group, weights=c) for c in a.T]) / size for a in arrays)
 
 
-def forces_of(law: Law, presses: Presses, moved_m: np.ndarray | None = None) -> np.ndarray:
+def forces_of(law: OneDLaws, presses: Presses, moved_m: np.ndarray | None = None) -> np.ndarray:
     """(n, 3) N of every row, along the normal: a law of each press, (p,) columns. moved_m: (p,) by how much
     earlier each press meets the surface than it says."""
     k, b, r, s = (column[presses.press] for column in law)
@@ -82,32 +82,32 @@ def forces_of(law: Law, presses: Presses, moved_m: np.ndarray | None = None) -> 
     return push[:, None] * presses.normal[presses.press]
 
 
-def _kelvin_voigt(fits: Fits) -> Law:
+def _kelvin_voigt(fits: Fits) -> OneDLaws:
     """Eq. (1): f = k u + b du/dt."""
     k = fits["k_kv"]
-    return Law(k, fits["b_kv"], np.ones_like(k), np.zeros_like(k))
+    return OneDLaws(k, fits["b_kv"], np.ones_like(k), np.zeros_like(k))
 
 
-def _hunt_crossley(fits: Fits) -> Law:
+def _hunt_crossley(fits: Fits) -> OneDLaws:
     """Eq. (2): f = k u^r + b u^r du/dt."""
     r = fits["r_hc"]
-    return Law(fits["k_hc"], fits["b_hc"], r, r)
+    return OneDLaws(fits["k_hc"], fits["b_hc"], r, r)
 
 
-def _undamped(fits: Fits) -> Law:
+def _undamped(fits: Fits) -> OneDLaws:
     """Hunt-Crossley without damping, eq. (6): f = k u^r."""
     k = fits["k_c"]
-    return Law(k, np.zeros_like(k), fits["r_c"], np.zeros_like(k))
+    return OneDLaws(k, np.zeros_like(k), fits["r_c"], np.zeros_like(k))
 
 
-def _one_exponent(fits: Fits) -> Law:
+def _one_exponent(fits: Fits) -> OneDLaws:
     """f = k_H u^r with one exponent for the whole object, eq. (6) fitted again at the mean exponent."""
     k = fits["k_h"]
     r = np.full_like(k, np.nanmean(fits["r_c"])) if len(k) else k
-    return Law(k, np.zeros_like(k), r, np.zeros_like(k))
+    return OneDLaws(k, np.zeros_like(k), r, np.zeros_like(k))
 
 
-LAWS: dict[str, Callable[[Fits], Law]] = {
+LAWS: dict[str, Callable[[Fits], OneDLaws]] = {
     "kelvin-voigt": _kelvin_voigt,
     "hunt-crossley": _hunt_crossley,
     "hunt-crossley-undamped": _undamped,

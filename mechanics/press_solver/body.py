@@ -13,10 +13,10 @@ import scipy.sparse as sp
 
 from palpate.mechanics.elastic.solver import partial_factor
 from palpate.mechanics.press_solver.graded_mesh import GradedMesh
-from palpate.mechanics.press_solver.solid import Response, Solid
+from palpate.mechanics.press_solver.solid import Response, SolidElements
 
 
-class Assembly:
+class BodyAssembly:
     """Where every element entry goes in the upper triangle of the stiffness of the free unknowns, found once.
 
     cells: (m, 10) node numbers. number: (3 n,) the unknown of each degree of freedom, -1 where it is held.
@@ -102,7 +102,7 @@ class BodyMaterial:
     local_bulk: float = 0.0
 
 
-class Body:
+class PressedBody:
     """A graded mesh with a material, condensed as far as it can be.
 
     near: (m,) bool, the cells that are solved at finite strain; none of them: the small-strain solid.
@@ -113,9 +113,9 @@ class Body:
     def __init__(
         self, mesh: GradedMesh, material: BodyMaterial, near: np.ndarray, kept_nodes: np.ndarray
     ) -> None:
-        def solid(cells: np.ndarray) -> Solid:
+        def solid(cells: np.ndarray) -> SolidElements:
             law = (material.poisson_ratio, material.stiffening, material.ratio[cells], material.coupled)
-            return Solid(mesh.points, mesh.cells[cells], *law, material.local_bulk)
+            return SolidElements(mesh.points, mesh.cells[cells], *law, material.local_bulk)
 
         self._count = len(mesh.points)
         free = ~mesh.fixed
@@ -137,14 +137,16 @@ class Body:
             block = self._condensed(mesh, solid(far), rest[free[rest]], joint)
         self._shared, self._block = shared, block
         if len(self._near):
-            self._assembly = Assembly(self._near.cells, self.number, shared)
+            self._assembly = BodyAssembly(self._near.cells, self.number, shared)
             self._assembly.add_block(block)
             self._factor = partial_factor(self._assembly.pattern, self.kept)
         self._schur: np.ndarray | None = None if len(self._near) else block
 
-    def _condensed(self, mesh: GradedMesh, rest: Solid, nodes: np.ndarray, joint: np.ndarray) -> np.ndarray:
+    def _condensed(
+        self, mesh: GradedMesh, rest: SolidElements, nodes: np.ndarray, joint: np.ndarray
+    ) -> np.ndarray:
         number = _numbered(nodes, self._count)
-        assembly = Assembly(rest.cells, number)
+        assembly = BodyAssembly(rest.cells, number)
         response = rest.respond(np.zeros_like(mesh.points), tangent=True)
         assert response is not None
         factor = partial_factor(assembly.pattern, number.reshape(-1, 3)[joint].ravel())

@@ -48,7 +48,7 @@ SHAPES, SLOPES = (np.ascontiguousarray(each) for each in _shapes(_POINTS))
 
 
 @dataclass
-class Grip:
+class ContactMemory:
     """What the contact remembers of every point at a converged step, relative to the sphere's centre.
 
     anchored (p,) bool; anchor (p, 3) m on the sphere; relative (p, 3) m, where the points are.
@@ -58,9 +58,9 @@ class Grip:
     anchor: np.ndarray
     relative: np.ndarray
 
-    def copy(self) -> Grip:
+    def copy(self) -> ContactMemory:
         """An independent copy."""
-        return Grip(self.anchored.copy(), self.anchor.copy(), self.relative.copy())
+        return ContactMemory(self.anchored.copy(), self.anchor.copy(), self.relative.copy())
 
 
 @dataclass
@@ -76,7 +76,7 @@ class Traction:
     slid: np.ndarray
 
 
-class SphereContact:
+class PressContact:
     """The faces (k, 6), in numbers of `points` (n, 3) m, that a sphere of `radius` m may meet.
 
     friction: Coulomb's coefficient, None sticks. penalty: traction an overlap, 1/m (of Young's modulus).
@@ -108,10 +108,10 @@ class SphereContact:
         """Numbers (c q,) of the points of the faces `chosen` (c,)."""
         return (len(SHAPES) * chosen[:, None] + np.arange(len(SHAPES))).ravel()
 
-    def start(self, centre: np.ndarray) -> Grip:
+    def start(self, centre: np.ndarray) -> ContactMemory:
         """Nothing touches; the sphere's centre is at `centre` m."""
         x = self.places(np.zeros_like(self.points), np.arange(len(self.faces))) - centre
-        return Grip(np.zeros(len(x), dtype=bool), np.zeros_like(x), x)
+        return ContactMemory(np.zeros(len(x), dtype=bool), np.zeros_like(x), x)
 
     def evaluate(
         self,
@@ -119,7 +119,7 @@ class SphereContact:
         chosen: np.ndarray,
         unknowns: np.ndarray,
         size: int,
-        grip: Grip,
+        grip: ContactMemory,
         sticks: bool = False,
     ) -> Traction:
         """The contact of the faces `chosen` (c,) whose points are at `relative` (c q, 3) to the centre.

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from palpate.mechanics.press_solver.body import Body, Condensed
-from palpate.mechanics.press_solver.contact import Grip, SphereContact, Traction
+from palpate.mechanics.press_solver.body import Condensed, PressedBody
+from palpate.mechanics.press_solver.contact import ContactMemory, PressContact, Traction
 
 _ROUNDS, _SETTLING_ITERATIONS, _SLIDING_ITERATIONS = 3, 60, 30
 _MOVED = 4e-3
@@ -39,7 +39,7 @@ class Settled:
     load: np.ndarray
     force: np.ndarray
     pressing: np.ndarray
-    grip: Grip
+    grip: ContactMemory
 
 
 class Settling:
@@ -49,7 +49,7 @@ class Settling:
     degrees of freedom, -1 where it is held.
     """
 
-    def __init__(self, contact: SphereContact, unknowns: np.ndarray) -> None:
+    def __init__(self, contact: PressContact, unknowns: np.ndarray) -> None:
         self.contact, self._unknowns = contact, unknowns
         self._of_face = unknowns[contact.faces].reshape(-1, 18)
         self._per_face = len(contact.weights[0])
@@ -61,7 +61,13 @@ class Settling:
         return np.where(self._unknowns >= 0, u[self._unknowns], 0.0)
 
     def settle(
-        self, schur: np.ndarray, load: np.ndarray, u: np.ndarray, centre: np.ndarray, before: Grip, grip: Grip
+        self,
+        schur: np.ndarray,
+        load: np.ndarray,
+        u: np.ndarray,
+        centre: np.ndarray,
+        before: ContactMemory,
+        grip: ContactMemory,
     ) -> Settled | None:
         """From displacement u (k,) with the sphere at `centre`; None where it does not settle.
 
@@ -89,7 +95,7 @@ class Settling:
 
     def _among(
         self, chosen: np.ndarray, schur: np.ndarray, load: np.ndarray, u: np.ndarray, centre: np.ndarray,
-        before: Grip, grip: Grip,
+        before: ContactMemory, grip: ContactMemory,
     ) -> Settled | None:  # fmt: skip
         nothing, nowhere = np.zeros(len(u)), np.zeros(len(grip.anchored), dtype=bool)
         result = Settled(nothing, np.zeros(len(u)), np.zeros(3), nowhere, grip.copy())
@@ -189,7 +195,12 @@ class Settling:
         return None
 
     def _arrived(
-        self, own: np.ndarray, traction: Traction, relative: np.ndarray, before: Grip, trial: Grip
+        self,
+        own: np.ndarray,
+        traction: Traction,
+        relative: np.ndarray,
+        before: ContactMemory,
+        trial: ContactMemory,
     ) -> bool:
         """Anchor the points that began to press in this step where they met the sphere, and set friction's
         bounds; whether any of it moved.
@@ -210,7 +221,7 @@ class Settling:
         far = 1e-4 * self.contact.radius
         return bool(pulls.any() or fresh.any() or (shift > far).any())
 
-    def kept_grip(self, u: np.ndarray, centre: np.ndarray, found: Settled) -> Grip:
+    def kept_grip(self, u: np.ndarray, centre: np.ndarray, found: Settled) -> ContactMemory:
         """What the contact remembers once the step has converged at displacement u (k,)."""
         everywhere = np.arange(len(self._of_face))
         relative = self._relative(u, everywhere, centre)
@@ -221,7 +232,7 @@ class Settling:
         here = relative * (self.contact.radius / np.linalg.norm(relative, axis=1, keepdims=True))
         anchor = np.where(held[:, None], traction.slid, here)
         self.refused[:] = False
-        return Grip(pressing, anchor, relative)
+        return ContactMemory(pressing, anchor, relative)
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -240,7 +251,7 @@ _TOUCHING = 3e-3
 
 
 @dataclass(frozen=True)
-class State:
+class Equilibrium:
     """An equilibrium: displacement (size,) m; the sphere's centre (3,) m; force on it (3,) and stored energy
     in units of Young's modulus, m^2 and m^3; pressures of the elements; pressing (p,) bool."""
 
@@ -249,18 +260,20 @@ class State:
     force: np.ndarray
     energy: float
     pressure: np.ndarray | None
-    grip: Grip
+    grip: ContactMemory
     pressing: np.ndarray
 
 
-class Path:
+class PressPath:
     """Drives a sphere that touches a body nowhere yet. tolerance: residual over the contact's forces."""
 
-    def __init__(self, body: Body, settling: Settling, centre: np.ndarray, tolerance: float = 2e-4) -> None:
+    def __init__(
+        self, body: PressedBody, settling: Settling, centre: np.ndarray, tolerance: float = 2e-4
+    ) -> None:
         self.body, self._settling, self._tolerance = body, settling, tolerance
         self._start = centre
         grip = settling.contact.start(centre)
-        self.state = State(
+        self.state = Equilibrium(
             np.zeros(body.size), centre, np.zeros(3), 0.0, None, grip, np.zeros(len(grip.anchored), bool)
         )
         self.tangents = self.iterations = 0
@@ -278,7 +291,7 @@ class Path:
         middle = (self.state.centre + centre) / 2
         return self.advance(middle, depth + 1) and self.advance(centre, depth + 1)
 
-    def _newton(self, centre: np.ndarray) -> State | None:
+    def _newton(self, centre: np.ndarray) -> Equilibrium | None:
         body, settling, state = self.body, self._settling, self.state
         u, grip = state.displacement, state.grip
         settling.refused[:] = False
@@ -297,7 +310,7 @@ class Path:
                 if last <= self._tolerance * max(float(np.linalg.norm(found.load)), 1e-9 * self._size):
                     held = settling.kept_grip(u[body.kept], centre, found)
                     pressure = None if response is None else response.pressure
-                    return State(u, centre, found.force, energy, pressure, held, found.pressing)
+                    return Equilibrium(u, centre, found.force, energy, pressure, held, found.pressing)
                 # the tangent of the step before foretells this one; the one taken there serves while it can
                 anew = anew or iteration == 1 or last > _SLOW * before
             if anew and not body.linear:

@@ -62,7 +62,7 @@ _SMOOTH_COSINE = 0.85
 """A vertex normal further than some 32 degrees from a triangle's own belongs to a crease: it stays flat."""
 
 
-class FeltSurface:
+class CurvedSurface:
     """A closed surface of fine triangles, curved by its vertex normals; answers nearest-point questions.
 
     vertices: (v, 3) m. triangles: (k, 3), outward, none much longer than its neighbours. curved: False keeps
@@ -166,7 +166,7 @@ class GradedMesh:
     parent: np.ndarray
 
 
-def drawn_to(mesh: TetMesh, surface: FeltSurface | None) -> TetMesh:
+def drawn_to(mesh: TetMesh, surface: CurvedSurface | None) -> TetMesh:
     """The linear mesh with its touchable nodes on the felt surface, as far as its cells stay sound."""
     mesh = mesh.linear()
     if surface is None:
@@ -178,7 +178,7 @@ def drawn_to(mesh: TetMesh, surface: FeltSurface | None) -> TetMesh:
 
 
 def graded_mesh(
-    mesh: TetMesh, surface: FeltSurface | None, size: Callable[[np.ndarray], np.ndarray]
+    mesh: TetMesh, surface: CurvedSurface | None, size: Callable[[np.ndarray], np.ndarray]
 ) -> GradedMesh:
     """Bisect until no tetrahedron's longest edge exceeds `size(its centroid)`, m, and make it quadratic.
 
@@ -237,7 +237,7 @@ def _bisected(
     fixed: np.ndarray,
     parent: np.ndarray,
     cut: tuple[np.ndarray, np.ndarray, np.ndarray],
-    surface: FeltSurface | None,
+    surface: CurvedSurface | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     ends, longest, split = cut
     n, (a, b) = len(points), ends[split].T
@@ -293,7 +293,7 @@ def _volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
     return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
 
 
-def _curved(mesh: TetMesh, faces: np.ndarray, surface: FeltSurface | None) -> np.ndarray:
+def _curved(mesh: TetMesh, faces: np.ndarray, surface: CurvedSurface | None) -> np.ndarray:
     """The quadratic mesh's points with the boundary's middles on the surface where the cells stay sound."""
     if surface is None:
         return mesh.points

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.press_solver.body import Body, BodyMaterial
-from palpate.mechanics.press_solver.contact import SphereContact
-from palpate.mechanics.press_solver.equilibrium import Path, Settling
-from palpate.mechanics.press_solver.graded_mesh import FeltSurface, drawn_to, even_surface, graded_mesh
+from palpate.mechanics.press_solver.body import BodyMaterial, PressedBody
+from palpate.mechanics.press_solver.contact import PressContact
+from palpate.mechanics.press_solver.equilibrium import PressPath, Settling
+from palpate.mechanics.press_solver.graded_mesh import CurvedSurface, drawn_to, even_surface, graded_mesh
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 _LONGEST = 1.3
@@ -88,7 +88,7 @@ class PressSolver:
         ratio: np.ndarray | None = None,
         options: PressOptions = PressOptions(),
     ) -> None:
-        self._surface = None if surface is None else FeltSurface(*even_surface(*surface))
+        self._surface = None if surface is None else CurvedSurface(*even_surface(*surface))
         self.mesh = drawn_to(mesh, self._surface)
         self.young_modulus_pa, self.poisson_ratio = float(young_modulus_pa), float(poisson_ratio)
         self.tip_radius_m, self.options = float(tip_radius_m), options
@@ -125,7 +125,7 @@ class PressSolver:
             radius[k] = path.contact_radius(normal)
         return PressSolution(force, radius, energy, np.isfinite(energy))
 
-    def _driven(self, path: Path, start: np.ndarray, centre: np.ndarray) -> bool:
+    def _driven(self, path: PressPath, start: np.ndarray, centre: np.ndarray) -> bool:
         """Drive the sphere straight to `centre` in steps that grow with what it has travelled; whether it got
         there. Where a point meets the sphere is found to first order in the step."""
         least, most = 0.3 * self.options.step * self.tip_radius_m, self.options.step * self.tip_radius_m
@@ -137,7 +137,9 @@ class PressSolver:
                 return False
         return True
 
-    def _prepared(self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, way: np.ndarray) -> Path:
+    def _prepared(
+        self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, way: np.ndarray
+    ) -> PressPath:
         """The body around a place, and the sphere that just touches it. way: (3,) m, of the tip."""
         options, tip = self.options, self.tip_radius_m
         first, last = (float(np.sqrt(tip * min(d, tip))) for d in (depths[0], depths[-1]))
@@ -168,11 +170,11 @@ class PressSolver:
         material = BodyMaterial(
             self.poisson_ratio, options.stiffening, options.coupled, self._ratio[mesh.parent], local
         )
-        body = Body(mesh, material, near, nodes)
-        contact = SphereContact(
+        body = PressedBody(mesh, material, near, nodes)
+        contact = PressContact(
             mesh.points[nodes], np.searchsorted(nodes, faces), tip, options.friction, options.penalty / first
         )
         rank = np.full(body.size + 1, -1)
         rank[body.kept] = np.arange(len(body.kept))
         settling = Settling(contact, rank[body.number.reshape(-1, 3)[nodes]])
-        return Path(body, settling, point + tip * normal, options.tolerance)
+        return PressPath(body, settling, point + tip * normal, options.tolerance)

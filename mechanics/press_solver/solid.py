@@ -39,7 +39,7 @@ class Response:
     growth: np.ndarray
 
 
-class Solid:
+class SolidElements:
     """Elements of a body: points (n, 3) m, cells (m, 10), their modulus over the global one (m,), or None.
 
     stiffening: r of the family, 0 neo-Hookean. coupled: which of the two energies. local_bulk: bulk modulus

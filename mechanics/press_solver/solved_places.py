@@ -151,7 +151,7 @@ class ExactPresses:
 
 
 @dataclass(frozen=True)
-class Touched:
+class PlacesToSolve:
     """p presses that are to be solved. points: (p, 3) m, on the surface. site, deepest_m: (p,), the place and
     how deep each was pressed. places: what the law of the touch knows of each."""
 
@@ -163,7 +163,7 @@ class Touched:
 
 def solve_touched(
     mesh: TetMesh,
-    touched: Touched,
+    touched: PlacesToSolve,
     laws: Sequence[str],
     *,
     ratio: np.ndarray,
@@ -210,7 +210,7 @@ def solve_touched(
 
 
 def _solved(
-    presses: SolvedPresses, touched: Touched, press: int, deepest_m: float, law: str
+    presses: SolvedPresses, touched: PlacesToSolve, press: int, deepest_m: float, law: str
 ) -> SolvedPlace | None:
     """A press's place for unit modulus; None where fewer than two depths are solved."""
     # rounded, so that what a model's files hold is found again

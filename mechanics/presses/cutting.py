@@ -11,7 +11,7 @@ import numpy as np
 from palpate.mechanics.presses.repeats import SITE_M, sites_of
 from palpate.mechanics.presses.table import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.recording.segments import ON_SUPPORT, Segment, runs
+from palpate.mechanics.recording.segments import ON_SUPPORT, TimeSegment, runs
 from palpate.mechanics.statistics import read_columns, spread_about_zero
 
 AROUND_S = 0.3
@@ -60,12 +60,12 @@ def loss_of_touch(
 
 def free_segments(
     t: np.ndarray, onset_s: np.ndarray, end_s: np.ndarray, begin_s: float
-) -> tuple[Segment, ...]:
+) -> tuple[TimeSegment, ...]:
     """Stretches of free air between the touches (onset_s, end_s), CLEAR_S away from each, after begin_s."""
     free = t > begin_s
     for onset, end in zip(onset_s, end_s, strict=True):
         free &= (t < onset - CLEAR_S) | (t > end + CLEAR_S)
-    return tuple(Segment("free", float(t[a]), float(t[b - 1])) for a, b in runs(free) if b > a + 1)
+    return tuple(TimeSegment("free", float(t[a]), float(t[b - 1])) for a, b in runs(free) if b > a + 1)
 
 
 def measured_noise(recording: Recording, free: np.ndarray, usual_n: float = USUAL_NOISE_N) -> Noise:
@@ -142,7 +142,7 @@ class FoundAround:
     free_air: np.ndarray | None = None
     trace_s: tuple[float, float] | None = None
     others_s: Sequence[tuple[float, float]] = ()
-    supported: Sequence[Segment] = ()
+    supported: Sequence[TimeSegment] = ()
     noise_n: float | None = None
     delay_s: float = 0.0
     delay_error_s: float = 0.0
@@ -174,8 +174,8 @@ def cut(
     touches = np.array([*zip(onset, end, strict=True), *around.others_s]).reshape(-1, 2)
     begin = -np.inf if around.trace_s is None else around.trace_s[1] + SETTLED_S
     air = free_segments(t, touches[:, 0], touches[:, 1], begin)
-    segments = [] if around.trace_s is None else [Segment("trace", *map(float, around.trace_s))]
-    segments += [Segment(k, float(a), float(b)) for k, a, b in zip(kinds, onset, end, strict=True)]
+    segments = [] if around.trace_s is None else [TimeSegment("trace", *map(float, around.trace_s))]
+    segments += [TimeSegment(k, float(a), float(b)) for k, a, b in zip(kinds, onset, end, strict=True)]
     segments += [s for s in (*recording.segments, *around.supported) if s.kind in ON_SUPPORT]
     point = centre - recording.tip_radius_m * normal
     table = Presses(

@@ -20,7 +20,7 @@ import numpy as np
 
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.frames import local_frames
-from palpate.mechanics.recording.segments import Segment, delayed, within
+from palpate.mechanics.recording.segments import TimeSegment, delayed, within
 
 FITS = ("k_kv", "b_kv", "k_hc", "b_hc", "r_hc", "k_v", "k_c", "r_c", "k_h", "e_pa")
 """What is fitted to each press: Kelvin-Voigt, eq. (1): k_kv N/m, b_kv N s/m; Hunt-Crossley, eq. (2): k_hc
@@ -85,7 +85,7 @@ class Presses:
     noise: Noise = field(default_factory=Noise)
     delay_s: float = 0.0
     delay_error_s: float = 0.0
-    segments: tuple[Segment, ...] = ()
+    segments: tuple[TimeSegment, ...] = ()
     recording: str = ""
     quaternion: np.ndarray | None = None
     fits: Mapping[str, np.ndarray] = field(default_factory=dict)

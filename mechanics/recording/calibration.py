@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.disk.reading import read_toml
-from palpate.mechanics.disk.schema import ANY, Key, Schema, check_table
+from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
 from palpate.mechanics.disk.toml_text import dump_toml
 from palpate.mechanics.disk.writing import Kind, atomic_file
 from palpate.mechanics.errors import RecordingError
@@ -28,14 +28,14 @@ SCHEMA: Schema = {
     "calibration": ANY,
     "tool": {
         "tip_radius_m": dataclasses.replace(TIP_RADIUS, low=1e-6, required=False),  # an AFM's is so small
-        "stiffness_n_per_m": Key(low=1.0, high=1e9, unit="N/m"),
-        "play_m": Key(low=-0.01, high=0.01, unit="m"),
+        "stiffness_n_per_m": FileKey(low=1.0, high=1e9, unit="N/m"),
+        "play_m": FileKey(low=-0.01, high=0.01, unit="m"),
     },
     "sensor": {
         "matrix": ANY,
-        "bias_n": Key(size=3, unit="N"),
-        "delay_s": Key(low=-1.0, high=1.0, unit="s"),
-        "force_noise_std_n": Key(low=0.0, high=10.0, unit="N"),
+        "bias_n": FileKey(size=3, unit="N"),
+        "delay_s": FileKey(low=-1.0, high=1.0, unit="s"),
+        "force_noise_std_n": FileKey(low=0.0, high=10.0, unit="N"),
     },
     "interval": ANY,
 }

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.disk.reading import no_file, reading
-from palpate.mechanics.disk.schema import ANY, Key, Listed, Schema
+from palpate.mechanics.disk.schema import ANY, FileKey, Listed, Schema
 from palpate.mechanics.disk.surface_files import UNITS
 from palpate.mechanics.disk.writing import Kind
 from palpate.mechanics.errors import RecordingError
@@ -96,38 +96,38 @@ def read_samples(path: Path) -> dict[str, np.ndarray]:
 
 SCHEMA: Schema = {
     "recording": {
-        "sample_rate_hz": Key(low=60.0, high=1e5, unit="Hz"),
-        "force_on": Key(str, choices=("tool", "object"), required=True),
-        "boundary_phase": Key(size=2, unit="s"),
-        "quasi_static": Key(bool),
-        "read_rate_hz": Key(low=1e-3, high=1e5, unit="Hz"),
+        "sample_rate_hz": FileKey(low=60.0, high=1e5, unit="Hz"),
+        "force_on": FileKey(str, choices=("tool", "object"), required=True),
+        "boundary_phase": FileKey(size=2, unit="s"),
+        "quasi_static": FileKey(bool),
+        "read_rate_hz": FileKey(low=1e-3, high=1e5, unit="Hz"),
     },
     "tool": {
         "tip_radius_m": TIP_RADIUS,
-        "mass_kg": Key(low=0.0, high=5.0, unit="kg"),
-        "calibration": Key(str),
+        "mass_kg": FileKey(low=0.0, high=5.0, unit="kg"),
+        "calibration": FileKey(str),
     },
     "sensor": {
-        "force_noise_std_n": Key(low=0.0, high=10.0, unit="N"),
-        "position_resolution_m": Key(low=0.0, high=0.01, unit="m"),
+        "force_noise_std_n": FileKey(low=0.0, high=10.0, unit="N"),
+        "position_resolution_m": FileKey(low=0.0, high=0.01, unit="m"),
     },
     "object": {
-        "name": Key(str),
+        "name": FileKey(str),
         "poisson_ratio": POISSON_RATIO,
-        "model": Key(str),
-        "shape": Key(str),
-        "shape_unit": Key(str, choices=tuple(UNITS)),
-        "shape_pose": Key(str, choices=("auto", "given")),
-        "shape_up": Key(str),
-        "shape_sink_m": Key(low=0.0, high=1.0, unit="m"),
-        "slab_m": Key(low=1e-6, high=2.0, unit="m"),
-        "half_space": Key(bool),
+        "model": FileKey(str),
+        "shape": FileKey(str),
+        "shape_unit": FileKey(str, choices=tuple(UNITS)),
+        "shape_pose": FileKey(str, choices=("auto", "given")),
+        "shape_up": FileKey(str),
+        "shape_sink_m": FileKey(low=0.0, high=1.0, unit="m"),
+        "slab_m": FileKey(low=1e-6, high=2.0, unit="m"),
+        "half_space": FileKey(bool),
     },
     "segment": Listed(
         {
-            "kind": Key(str, choices=STATED, required=True),
-            "start_s": Key(unit="s", required=True),
-            "end_s": Key(unit="s", required=True),
+            "kind": FileKey(str, choices=STATED, required=True),
+            "start_s": FileKey(unit="s", required=True),
+            "end_s": FileKey(unit="s", required=True),
         }
     ),
     "import": ANY,

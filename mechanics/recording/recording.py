@@ -37,7 +37,7 @@ from palpate.mechanics.recording.files import (
     samples_path,
 )
 from palpate.mechanics.recording.sane import check_sane
-from palpate.mechanics.recording.segments import STATED, Segment
+from palpate.mechanics.recording.segments import STATED, TimeSegment
 from palpate.mechanics.result import Result
 
 _QUICKEST_HZ = 2e4
@@ -77,7 +77,7 @@ class Recording(Result):
     path: Path | None = None
     sha256: str = ""
     description: Mapping[str, Any] = field(default_factory=dict)
-    segments: tuple[Segment, ...] = ()
+    segments: tuple[TimeSegment, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("t", "position", "force_on_tool", "quaternion"):
@@ -244,7 +244,8 @@ def read_recording(path: Path | str) -> Recording:
             sha256=sha256_of_file(samples),
             description=table,
             segments=tuple(
-                Segment(s["kind"], float(s["start_s"]), float(s["end_s"])) for s in table.get("segment", ())
+                TimeSegment(s["kind"], float(s["start_s"]), float(s["end_s"]))
+                for s in table.get("segment", ())
             ),
         )
         check_sane(t, recording.sample_rate_hz, recording.position, force)

@@ -18,7 +18,7 @@ ON_SUPPORT = ("rigid", "retrace")
 
 
 @dataclass(frozen=True)
-class Segment:
+class TimeSegment:
     """A stretch of the recording: its kind, one of KINDS, and when it lasts, s."""
 
     kind: str
@@ -26,7 +26,7 @@ class Segment:
     end_s: float
 
 
-def within(segments: Iterable[Segment], kind: str, t: np.ndarray) -> np.ndarray:
+def within(segments: Iterable[TimeSegment], kind: str, t: np.ndarray) -> np.ndarray:
     """(n,) bool for each time (n,) s: whether it lies in a segment of that kind."""
     inside = np.zeros(len(t), dtype=bool)
     for segment in segments:

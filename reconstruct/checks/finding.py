@@ -112,7 +112,7 @@ _MISFIT = 0.5
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ReconstructionOutcome:
     """What is looked at of a reconstruction: modulus and its 95 % interval, Pa; of each press (k,) the misfit
     rms (NaN where unknown) and the force rms, N, and first touch, s."""
 
@@ -125,16 +125,16 @@ class Outcome:
 
 def outcome_of(
     presses: Presses, modulus_pa: float, ci95_pa: tuple[float, float], fit: ModulusFit | None
-) -> Outcome:
+) -> ReconstructionOutcome:
     """Of fitted presses; the paper's method (no fit) states no misfit."""
     net, touched = presses.net, presses.press[presses.counted]
     squared = np.bincount(touched, (net.force[presses.counted] ** 2).sum(axis=1), len(presses))
     force = np.sqrt(squared / np.maximum(np.bincount(touched, minlength=len(presses)), 1))
     misfit = np.full(len(presses), np.nan) if fit is None else fit.press.rms_n
-    return Outcome(modulus_pa, ci95_pa, misfit, force, presses.onset_s)
+    return ReconstructionOutcome(modulus_pa, ci95_pa, misfit, force, presses.onset_s)
 
 
-def outcome(result: Outcome) -> Iterator[Finding]:
+def outcome(result: ReconstructionOutcome) -> Iterator[Finding]:
     """A modulus or interval that is none; a modulus beyond soft objects; a misfit as large as the force."""
     modulus, (low, high) = result.modulus_pa, result.ci95_pa
     numbers = np.array([modulus, low, high])

@@ -16,7 +16,7 @@ from palpate.mechanics.recording.recording import Recording, base_model_of
 from palpate.reconstruction.checks.air import air, delay
 from palpate.reconstruction.checks.channels import channels
 from palpate.reconstruction.checks.clock import clock
-from palpate.reconstruction.checks.finding import Finding, Outcome, outcome
+from palpate.reconstruction.checks.finding import Finding, ReconstructionOutcome, outcome
 from palpate.reconstruction.checks.handedness import handedness
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
@@ -28,7 +28,7 @@ from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
 
 OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)
-OF_RESULTS: tuple[Callable[[Outcome], Iterator[Finding]], ...] = (outcome,)
+OF_RESULTS: tuple[Callable[[ReconstructionOutcome], Iterator[Finding]], ...] = (outcome,)
 REFUSALS = ("no base", "no presses")
 """Findings that say where reconstruction itself stops, fault or not."""
 _LEAST_SAMPLES = 100
@@ -72,7 +72,7 @@ def checked_presses(exploration: Exploration) -> tuple[Finding, ...]:
     return ordered(f for check in OF_PRESSES for f in check(exploration))
 
 
-def checked_results(result: Outcome) -> tuple[Finding, ...]:
+def checked_results(result: ReconstructionOutcome) -> tuple[Finding, ...]:
     """What the modulus and its misfit show."""
     return ordered(f for check in OF_RESULTS for f in check(result))
 
@@ -143,7 +143,7 @@ def seen(data: Samples | None) -> Seen:
     )
 
 
-class Checkup:
+class CheckupRun:
     """The check-up beside a reconstruction: each stage refuses what is grave, unless `force`.
 
     found: what the stages so far have found. spans: contacts that need not be found again, None where
@@ -165,7 +165,7 @@ class Checkup:
         """Before a surface is made."""
         self.found = ordered([*self.found, *self._judged(checked_presses(exploration))])
 
-    def interval(self, result: Outcome) -> tuple[float, float]:
+    def interval(self, result: ReconstructionOutcome) -> tuple[float, float]:
         """Before the modulus is believed: its 95 % interval, Pa, as wide as the findings make it."""
         self.found = ordered([*self.found, *self._judged(checked_results(result))])
         return widened(result.modulus_pa, result.ci95_pa, self.found)

@@ -21,9 +21,9 @@ from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.reconstruction.geometry.registration import (
     SURFACE_SD_M,
-    Body,
     Registration,
-    Touched,
+    ShapeToPlace,
+    TouchedPoints,
     register,
 )
 from palpate.reconstruction.geometry.slab import place_slab
@@ -65,7 +65,7 @@ def place(
     stood = standing(given, options.up, options.sink_m)
     traces = options.pose == "auto" and set(presses.kinds) == {"press"}
     support = _traced_support(first) if traces else None
-    body = Body(stood.vertices, stood.triangles, stood.support_point, stood.support_normal)
+    body = ShapeToPlace(stood.vertices, stood.triangles, stood.support_point, stood.support_normal)
     touched = _touched(presses, support)
     found = register(body, touched, free=options.pose == "auto")
     progress("registration", 1.0)
@@ -74,8 +74,8 @@ def place(
     return dataclasses.replace(placed, doubt=_doubt(given, found, touched, free=options.pose == "auto"))
 
 
-def _touched(presses: Presses, support: tuple[np.ndarray, np.ndarray] | None) -> Touched:
-    return Touched(
+def _touched(presses: Presses, support: tuple[np.ndarray, np.ndarray] | None) -> TouchedPoints:
+    return TouchedPoints(
         centres=presses.centre,
         normals=presses.contact_normal,
         error_m=presses.onset_error_m,
@@ -114,7 +114,7 @@ def _check(given: ClosedSurface, found: Registration, options: GeometryOptions) 
     )
 
 
-def _doubt(given: ClosedSurface, found: Registration, touched: Touched, *, free: bool) -> str:
+def _doubt(given: ClosedSurface, found: Registration, touched: TouchedPoints, *, free: bool) -> str:
     """Why the shape is another object's; '' where first touches lie on it as they can, or are too few.
 
     Of 68 % of the places, with what the six numbers of a registered pose have taken off.

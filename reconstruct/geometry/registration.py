@@ -30,7 +30,7 @@ _ALIKE_M = 0.02
 
 
 @dataclass(frozen=True)
-class Touched:
+class TouchedPoints:
     """What the registration goes by; device frame. centres: (k, 3) m of the tip; normals: (k, 3) outward,
     from the force; error_m: (k,) standard deviation along it; site: (k,). support: (point (3,), normal
     (3,)) of a traced support, or None."""
@@ -44,7 +44,7 @@ class Touched:
 
 
 @dataclass(frozen=True)
-class Body:
+class ShapeToPlace:
     """A closed surface in its own frame, with its foot: point and normal into the object."""
 
     vertices: np.ndarray
@@ -85,7 +85,7 @@ class Registration:
         return lever @ (vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def register(body: Body, touched: Touched, *, free: bool = True) -> Registration:
+def register(body: ShapeToPlace, touched: TouchedPoints, *, free: bool = True) -> Registration:
     """The most likely pose of a body by its touches.
 
     free: False takes the body where it stands and only tells the residuals: its pose has no error then.
@@ -125,7 +125,7 @@ class _Fit:
 
 
 class _Solver:
-    def __init__(self, body: Body, touched: Touched) -> None:
+    def __init__(self, body: ShapeToPlace, touched: TouchedPoints) -> None:
         import pyvista
 
         self.body, self.touched = body, touched

@@ -152,7 +152,7 @@ def _energy(stretch: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Law:
+class UniaxialLaw:
     """bases(): (shape parameter, stretch -> (n, k) columns whose sum the stress is); young: coefficients and
     shape to Young's modulus at no strain, Pa."""
 
@@ -169,27 +169,27 @@ def _powers(stretch: np.ndarray, count: int) -> np.ndarray:
 
 
 LAWS = (
-    Law("linear", (0.0,), lambda s, _: (s - 1)[:, None], lambda c, _: float(c[0])),
-    Law("neo-hookean", (0.0,), lambda s, _: _neo(s)[:, None], lambda c, _: 6 * float(c[0])),
-    Law(
+    UniaxialLaw("linear", (0.0,), lambda s, _: (s - 1)[:, None], lambda c, _: float(c[0])),
+    UniaxialLaw("neo-hookean", (0.0,), lambda s, _: _neo(s)[:, None], lambda c, _: 6 * float(c[0])),
+    UniaxialLaw(
         "yeoh",
         (0.0,),
         lambda s, _: _powers(s, 2),
         lambda c, _: 6 * float(c[0]),
     ),
-    Law(
+    UniaxialLaw(
         "yeoh-3",
         (0.0,),
         lambda s, _: _powers(s, 3),
         lambda c, _: 6 * float(c[0]),
     ),
-    Law(
+    UniaxialLaw(
         "fung",
         tuple(_FUNG),
         lambda s, b: (_neo(s) * np.exp(np.minimum(b * _energy(s), 60.0)))[:, None],
         lambda c, _: 6 * float(c[0]),
     ),
-    Law(
+    UniaxialLaw(
         "ogden",
         tuple(_OGDEN),
         lambda s, a: (s ** (a - 1) - s ** (-a / 2 - 1))[:, None],
@@ -200,10 +200,10 @@ FLOOR, CEILING = "linear", "regression"
 
 
 @dataclass(frozen=True)
-class Fitted:
+class UniaxialFit:
     """A law fitted: its coefficients, shape parameter, zero of the strain, and Young's modulus, Pa."""
 
-    law: Law
+    law: UniaxialLaw
     coefficients: np.ndarray
     shape: float
     zero: float
@@ -220,19 +220,19 @@ class Fitted:
         )
 
 
-def fit_law(curves: Sequence[Uniaxial], law: Law) -> Fitted:
+def fit_law(curves: Sequence[Uniaxial], law: UniaxialLaw) -> UniaxialFit:
     """Least squares over all curves alike (each over its own greatest stress), one zero for all."""
     stretch = np.concatenate([c.stretch for c in curves])
     weight = np.concatenate([np.full(len(c.stress), 1 / np.abs(c.stress).max()) for c in curves])
     stress = np.concatenate([c.stress for c in curves])
-    best: tuple[float, Fitted] | None = None
+    best: tuple[float, UniaxialFit] | None = None
     for zero in _ZEROS:
         for shape in law.shapes:
             columns = law.columns(stretch - zero, shape) * weight[:, None]
             coefficients = np.linalg.lstsq(columns, stress * weight, rcond=None)[0]
             cost = float(((columns @ coefficients - stress * weight) ** 2).sum())
             if best is None or cost < best[0]:
-                best = cost, Fitted(law, coefficients, float(shape), float(zero))
+                best = cost, UniaxialFit(law, coefficients, float(shape), float(zero))
     assert best is not None
     return best[1]
 

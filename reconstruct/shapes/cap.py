@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.reconstruction.shapes.shape import Parameter, project, rings_to_mesh, values_of, with_values
+from palpate.reconstruction.shapes.shape import ShapeParameter, project, rings_to_mesh, values_of, with_values
 
 
 @dataclass(frozen=True)
@@ -15,22 +15,27 @@ class Cap:
     instead."""
 
     name: str
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ShapeParameter, ...]
     complexity: int
     faceted: bool = False
 
     @classmethod
     def sphere(cls, centre: np.ndarray, radius_m: float) -> Cap:
         """A first guess."""
-        return cls("sphere", (*_centre(centre, radius_m), Parameter("radius_m", radius_m, 0.02, 0.003)), 1)
+        return cls(
+            "sphere", (*_centre(centre, radius_m), ShapeParameter("radius_m", radius_m, 0.02, 0.003)), 1
+        )
 
     @classmethod
     def ellipsoid(cls, centre: np.ndarray, axes_m: np.ndarray, turn_rad: float) -> Cap:
         """A first guess: axes (3,), the third upright; turn about the upright."""
         axes = [
-            Parameter(f"axis_{k}_m", float(a), 0.02, 0.003, 0.5) for k, a in zip("abc", axes_m, strict=True)
+            ShapeParameter(f"axis_{k}_m", float(a), 0.02, 0.003, 0.5)
+            for k, a in zip("abc", axes_m, strict=True)
         ]
-        return cls("ellipsoid", (*_centre(centre, axes_m[2]), *axes, Parameter("turn_rad", turn_rad, 0.5)), 2)
+        return cls(
+            "ellipsoid", (*_centre(centre, axes_m[2]), *axes, ShapeParameter("turn_rad", turn_rad, 0.5)), 2
+        )
 
     def with_values(self, values: np.ndarray) -> Cap:
         return replace(self, parameters=with_values(self.parameters, values))
@@ -74,10 +79,10 @@ class Cap:
         return rings_to_mesh(rings, centre + np.array([0, 0, axes[2]]))
 
 
-def _centre(centre: np.ndarray, size_m: float) -> tuple[Parameter, ...]:
+def _centre(centre: np.ndarray, size_m: float) -> tuple[ShapeParameter, ...]:
     spreads = (0.01, 0.01, 0.02)
     bounds = ((-np.inf, np.inf), (-np.inf, np.inf), (-0.95 * size_m - 0.3, 0.9 * size_m))
     return tuple(
-        Parameter(f"centre_{k}_m", float(c), s, *b)
+        ShapeParameter(f"centre_{k}_m", float(c), s, *b)
         for k, c, s, b in zip("xyz", centre, spreads, bounds, strict=True)
     )

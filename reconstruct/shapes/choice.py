@@ -19,7 +19,7 @@ from palpate.reconstruction.shapes.cushion import Cushion
 from palpate.reconstruction.shapes.dish import Dish
 from palpate.reconstruction.shapes.dome import Dome
 from palpate.reconstruction.shapes.drawing import draw
-from palpate.reconstruction.shapes.fit import Evidence, Seen, fit
+from palpate.reconstruction.shapes.fit import Evidence, ShapeEvidence, fit
 from palpate.reconstruction.shapes.kriging import Explained, explain
 from palpate.reconstruction.shapes.outline import Outline, circle, polygon, seeing_centre, smooth_curve
 from palpate.reconstruction.shapes.polyhedron import Polyhedron
@@ -48,7 +48,7 @@ class HiddenOutlineError(SurfaceError):
     """No point of the base sees its whole outline, so that the fitted shapes cannot be drawn."""
 
 
-def first_guesses(evidence: Evidence, seen: Seen) -> list[Shape]:
+def first_guesses(evidence: Evidence, seen: ShapeEvidence) -> list[Shape]:
     """One or more starts of each shape that the outline allows.
 
     Raises HiddenOutlineError where no point sees the whole outline, SurfaceError where nothing stands on it.
@@ -85,7 +85,7 @@ def first_guesses(evidence: Evidence, seen: Seen) -> list[Shape]:
     return found + _dishes(seen, outlines)
 
 
-def _dishes(seen: Seen, outlines: list[Outline]) -> list[Shape]:
+def _dishes(seen: ShapeEvidence, outlines: list[Outline]) -> list[Shape]:
     """Dished prisms, where a touch that faces up lies lower than the highest touch."""
     feet = seen.centres - seen.tip_radius_m * seen.normals
     widest = abs(float(outlines[0].distance(outlines[0].centre[None])[0]))
@@ -125,7 +125,7 @@ Drawn = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def try_shapes(evidence: Evidence, which: str = "auto", progress: Progress = silent) -> list[Explained]:
     """Every shape (or those named `which`), fitted, without and with a free residual field."""
-    seen = Seen.of(evidence)
+    seen = ShapeEvidence.of(evidence)
     guesses = [g for g in first_guesses(evidence, seen) if which in ("auto", g.name)]
     if not guesses:
         raise SurfaceError(f"the base outline does not allow a {which}: use --surface auto")

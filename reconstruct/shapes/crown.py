@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.reconstruction.shapes.outline import Outline
 from palpate.reconstruction.shapes.prism import Prism
-from palpate.reconstruction.shapes.shape import Parameter, project, rings_to_mesh, values_of, with_values
+from palpate.reconstruction.shapes.shape import ShapeParameter, project, rings_to_mesh, values_of, with_values
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Crown:
     top: z = height + slope . d + d . bend . d / 2 with d from the outline's centre."""
 
     prism: Prism
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ShapeParameter, ...]
     name: str = "crown"
     complexity: int = 5  # outline, slope, three bends
     faceted: bool = True
@@ -26,8 +26,8 @@ class Crown:
     def of(cls, outline: Outline, height_m: float) -> Crown:
         """A first guess over an outline."""
         prism = Prism.of(outline, height_m, sloped=False, drafted=False)
-        slopes = (Parameter("slope_x", 0.0, 0.2, -2, 2), Parameter("slope_y", 0.0, 0.2, -2, 2))
-        bends = tuple(Parameter(f"bend_{k}", 0.0, 8.0, -60, 60) for k in ("xx", "xy", "yy"))
+        slopes = (ShapeParameter("slope_x", 0.0, 0.2, -2, 2), ShapeParameter("slope_y", 0.0, 0.2, -2, 2))
+        bends = tuple(ShapeParameter(f"bend_{k}", 0.0, 8.0, -60, 60) for k in ("xx", "xy", "yy"))
         return cls(prism, (*prism.parameters, *slopes, *bends))
 
     def with_values(self, values: np.ndarray) -> Crown:

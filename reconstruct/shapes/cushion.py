@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.reconstruction.shapes.outline import Outline
-from palpate.reconstruction.shapes.shape import Parameter, project, rings_to_mesh, values_of, with_values
+from palpate.reconstruction.shapes.shape import ShapeParameter, project, rings_to_mesh, values_of, with_values
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Cushion:
     """
 
     outline: Outline
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ShapeParameter, ...]
     name: str = "cushion"
     complexity: int = 3
     faceted: bool = False
@@ -32,11 +32,11 @@ class Cushion:
         return cls(
             outline,
             (
-                Parameter("grown_m", 0.0, 0.002, -0.006, 0.006),
-                Parameter("height_m", height_m, 0.02, 0.3 * height_m, 2 * height_m),
-                Parameter("rounding_width_m", min(width_m, 0.9 * widest), 0.005, 0.001, 1.5 * widest),
-                Parameter("rounding_share", min(0.8, width_m / height_m), 0.2, 0.02, 1.0),
-                Parameter("exponent", 2.0, 0.5, 1.0, 6.0),
+                ShapeParameter("grown_m", 0.0, 0.002, -0.006, 0.006),
+                ShapeParameter("height_m", height_m, 0.02, 0.3 * height_m, 2 * height_m),
+                ShapeParameter("rounding_width_m", min(width_m, 0.9 * widest), 0.005, 0.001, 1.5 * widest),
+                ShapeParameter("rounding_share", min(0.8, width_m / height_m), 0.2, 0.02, 1.0),
+                ShapeParameter("exponent", 2.0, 0.5, 1.0, 6.0),
             ),
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.reconstruction.shapes.outline import Outline
 from palpate.reconstruction.shapes.prism import Prism
-from palpate.reconstruction.shapes.shape import Parameter, rings_to_mesh, values_of, with_values
+from palpate.reconstruction.shapes.shape import ShapeParameter, rings_to_mesh, values_of, with_values
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Dish:
     """
 
     prism: Prism
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ShapeParameter, ...]
     name: str = "dish"
     complexity: int = 4
     faceted: bool = True
@@ -33,10 +33,10 @@ class Dish:
         mouth = 0.75 * float(np.abs(outline.distance(outline.centre[None])[0]))
         radius = (mouth**2 + deep**2) / (2 * deep)
         ball = (
-            Parameter("ball_x_m", float(outline.centre[0]), 0.01),
-            Parameter("ball_y_m", float(outline.centre[1]), 0.01),
-            Parameter("ball_z_m", float(bottom[2] + radius), 0.02),
-            Parameter("ball_radius_m", float(radius), 0.02, 0.006, 0.5),
+            ShapeParameter("ball_x_m", float(outline.centre[0]), 0.01),
+            ShapeParameter("ball_y_m", float(outline.centre[1]), 0.01),
+            ShapeParameter("ball_z_m", float(bottom[2] + radius), 0.02),
+            ShapeParameter("ball_radius_m", float(radius), 0.02, 0.006, 0.5),
         )
         own = tuple(replace(p, spread=0.004) if p.label == "height_m" else p for p in prism.parameters)
         return cls(prism, (*own, *ball))

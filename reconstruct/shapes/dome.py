@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.reconstruction.shapes.outline import Outline
-from palpate.reconstruction.shapes.shape import Parameter, project, rings_to_mesh, values_of, with_values
+from palpate.reconstruction.shapes.shape import ShapeParameter, project, rings_to_mesh, values_of, with_values
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Dome:
     """
 
     outline: Outline
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ShapeParameter, ...]
     name: str = "dome"
     complexity: int = 3
     faceted: bool = False
@@ -31,12 +31,12 @@ class Dome:
         return cls(
             outline,
             (
-                Parameter("grown_m", 0.0, 0.002, -0.008, 0.008),
-                Parameter("height_m", height_m, 0.02, 0.3 * height_m, 3 * height_m),
-                Parameter("wall_exponent", exponent, 1.0, 0.8, 16.0),
-                Parameter("cap_exponent", exponent, 1.0, 0.8, 16.0),
-                Parameter("lean_x_m", 0.0, 0.01, -0.03, 0.03),
-                Parameter("lean_y_m", 0.0, 0.01, -0.03, 0.03),
+                ShapeParameter("grown_m", 0.0, 0.002, -0.008, 0.008),
+                ShapeParameter("height_m", height_m, 0.02, 0.3 * height_m, 3 * height_m),
+                ShapeParameter("wall_exponent", exponent, 1.0, 0.8, 16.0),
+                ShapeParameter("cap_exponent", exponent, 1.0, 0.8, 16.0),
+                ShapeParameter("lean_x_m", 0.0, 0.01, -0.03, 0.03),
+                ShapeParameter("lean_y_m", 0.0, 0.01, -0.03, 0.03),
             ),
         )
 

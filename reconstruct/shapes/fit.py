@@ -111,7 +111,7 @@ _WEAK = 3.0  # prior spreads: holds only what no touch can tell, such as the slo
 
 
 @dataclass(frozen=True)
-class Seen:
+class ShapeEvidence:
     """The evidence as the fits want it: support frame, the outline thinned.
 
     centres: (m, 3). outline: (k, 3) tip's centre. normals: (m, 3). error_m: (m,). sites: (m,) place number of
@@ -126,7 +126,7 @@ class Seen:
     tip_radius_m: float
 
     @classmethod
-    def of(cls, evidence: Evidence) -> Seen:
+    def of(cls, evidence: Evidence) -> ShapeEvidence:
         """Thin the outline evenly by angle, medians of what overlaps."""
         rim = evidence.to_support(evidence.outline_centres)
         angle = np.arctan2(rim[:, 1], rim[:, 0])
@@ -147,14 +147,14 @@ class Seen:
         )
 
 
-def residuals(shape: Shape, seen: Seen, lean_m: float) -> tuple[np.ndarray, np.ndarray]:
+def residuals(shape: Shape, seen: ShapeEvidence, lean_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Gap (m,) between the shape and the touching tip, and (k,) the same along the outline; m, outward
     positive."""
     found = shape.distance(np.vstack([seen.centres, seen.outline])) - seen.tip_radius_m
     return found[: len(seen.centres)], found[len(seen.centres) :] + lean_m
 
 
-def fit(shape: Shape, seen: Seen) -> tuple[Shape, float]:
+def fit(shape: Shape, seen: ShapeEvidence) -> tuple[Shape, float]:
     """The shape that touches best, and the lean of the tracing (m)."""
     start = values_of(shape)
     spread = np.array([p.spread for p in shape.parameters])

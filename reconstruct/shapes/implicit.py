@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.errors import SurfaceError
 from palpate.mechanics.shape.nearest import distance
-from palpate.reconstruction.shapes.fit import LEAN_M, Evidence, Seen
+from palpate.reconstruction.shapes.fit import LEAN_M, Evidence, ShapeEvidence
 from palpate.reconstruction.shapes.outline import farthest_points
 
 _OFF_M = 0.004
@@ -82,7 +82,7 @@ def implicit_surface(
     return points, faces if volume > 0 else faces[:, ::-1]
 
 
-def implicit_held_out(evidence: Evidence, seen: Seen) -> float:
+def implicit_held_out(evidence: Evidence, seen: ShapeEvidence) -> float:
     """Root mean square error (m) of touches in places left out, a fifth of the places at a time."""
     misses = []
     for fold in range(_FOLDS):

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from palpate.mechanics.statistics import matern_3_2, spread_about_zero
-from palpate.reconstruction.shapes.fit import LEAN_SPREAD_M, OUTLINE_ERROR_M, Seen, residuals
+from palpate.reconstruction.shapes.fit import LEAN_SPREAD_M, OUTLINE_ERROR_M, ShapeEvidence, residuals
 from palpate.reconstruction.shapes.shape import Shape, gradient, parameter_slopes
 
 _TURN = 0.6
@@ -24,7 +24,7 @@ _TURN = 0.6
 
 
 @dataclass(frozen=True)
-class Law:
+class FieldPrior:
     """Standard deviation of g on walls and on tops (m), its correlation length (m), and the touches' error
     (m)."""
 
@@ -51,9 +51,9 @@ class Explained:
     """A fitted shape with its residual field. lean_m: of the tracing. law: how large and how smooth g is."""
 
     shape: Shape
-    seen: Seen
+    seen: ShapeEvidence
     lean_m: float
-    law: Law
+    law: FieldPrior
 
     @property
     def free(self) -> bool:
@@ -168,7 +168,7 @@ _FIELD_M = (0.0003, 0.001, 0.003, 0.01)
 _LENGTH_M = (0.02, 0.04, 0.08)
 
 
-def explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained:
+def explain(shape: Shape, lean_m: float, seen: ShapeEvidence, *, free: bool) -> Explained:
     """The residual field of greatest likelihood; without one (free false) only the touches' error is sought.
 
     Touches that lie far off while all others agree are given their own error, so that a bad press neither
@@ -185,18 +185,20 @@ def explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained
     return _explain(shape, lean_m, replace(seen, error_m=error), free=free)
 
 
-def _explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained:
-    start = Explained(shape, seen, lean_m, Law(0.0, 0.0, 0.03, _TOUCH_M[0]))
+def _explain(shape: Shape, lean_m: float, seen: ShapeEvidence, *, free: bool) -> Explained:
+    start = Explained(shape, seen, lean_m, FieldPrior(0.0, 0.0, 0.03, _TOUCH_M[0]))
     shared = {name: getattr(start, name) for name in ("gap", "feet", "slopes")}
 
-    def with_law(law: Law) -> Explained:
+    def with_law(law: FieldPrior) -> Explained:
         found = replace(start, law=law)
         found.__dict__.update(shared)
         return found
 
     if not free:
-        return max((with_law(Law(0.0, 0.0, 0.03, t)) for t in _TOUCH_M), key=lambda e: e.log_likelihood)
-    best = with_law(Law(_FIELD_M[1], _FIELD_M[1], _LENGTH_M[1], _TOUCH_M[1]))
+        return max(
+            (with_law(FieldPrior(0.0, 0.0, 0.03, t)) for t in _TOUCH_M), key=lambda e: e.log_likelihood
+        )
+    best = with_law(FieldPrior(_FIELD_M[1], _FIELD_M[1], _LENGTH_M[1], _TOUCH_M[1]))
     for _ in range(3):
         before = best.law
         for name, levels in (

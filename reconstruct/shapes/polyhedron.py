@@ -16,7 +16,7 @@ from palpate.mechanics.errors import SurfaceError
 from palpate.mechanics.shape.nearest import distance
 from palpate.reconstruction.shapes.fit import LEAN_M, Evidence
 from palpate.reconstruction.shapes.outline import Outline, farthest_points, sides
-from palpate.reconstruction.shapes.shape import Parameter, values_of, with_values
+from palpate.reconstruction.shapes.shape import ShapeParameter, values_of, with_values
 
 _SECTORS = 48
 
@@ -144,7 +144,7 @@ class Polyhedron:
 
     walls: int
     tops: int
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ShapeParameter, ...]
     name: str = "polyhedron"
     faceted: bool = True
 
@@ -178,14 +178,14 @@ class Polyhedron:
         tops = _planes(centres[free], normals[free], tip_radius_m)
         if not tops and not (np.array(tilts) > 0.1).all():
             return None
-        found = [Parameter(f"side_{k + 1}_rad", float(a), 0.05) for k, a in enumerate(angles)]
-        found += [Parameter(f"side_{k + 1}_m", float(o), 0.005) for k, o in enumerate(offsets)]
-        found += [Parameter(f"tilt_{k + 1}_rad", t, 0.1, -0.3, 1.4) for k, t in enumerate(tilts)]
+        found = [ShapeParameter(f"side_{k + 1}_rad", float(a), 0.05) for k, a in enumerate(angles)]
+        found += [ShapeParameter(f"side_{k + 1}_m", float(o), 0.005) for k, o in enumerate(offsets)]
+        found += [ShapeParameter(f"tilt_{k + 1}_rad", t, 0.1, -0.3, 1.4) for k, t in enumerate(tilts)]
         for k, plane in enumerate(tops):
             found += [
-                Parameter(f"top_{k + 1}_height_m", float(plane[0]), 0.01),
-                Parameter(f"top_{k + 1}_slope_x", float(plane[1]), 0.2),
-                Parameter(f"top_{k + 1}_slope_y", float(plane[2]), 0.2),
+                ShapeParameter(f"top_{k + 1}_height_m", float(plane[0]), 0.01),
+                ShapeParameter(f"top_{k + 1}_slope_x", float(plane[1]), 0.2),
+                ShapeParameter(f"top_{k + 1}_slope_y", float(plane[2]), 0.2),
             ]
         return cls(len(angles), len(tops), tuple(found))
 

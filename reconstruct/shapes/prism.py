@@ -7,24 +7,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.reconstruction.shapes.outline import Outline, corners, sides
-from palpate.reconstruction.shapes.shape import Parameter, rings_to_mesh, with_values
+from palpate.reconstruction.shapes.shape import ShapeParameter, rings_to_mesh, with_values
 
 
-def _outline_parameters(outline: Outline) -> tuple[Parameter, ...]:
+def _outline_parameters(outline: Outline) -> tuple[ShapeParameter, ...]:
     if outline.kind == "circle":
         radius = float(np.linalg.norm(outline.vertices[0] - outline.centre))
         x, y = outline.centre
         return (
-            Parameter("centre_x_m", float(x), 0.01),
-            Parameter("centre_y_m", float(y), 0.01),
-            Parameter("radius_m", radius, 0.01, 0.002),
+            ShapeParameter("centre_x_m", float(x), 0.01),
+            ShapeParameter("centre_y_m", float(y), 0.01),
+            ShapeParameter("radius_m", radius, 0.01, 0.002),
         )
     if outline.kind == "polygon":
         angles, offsets = sides(outline.vertices)
-        turned = [Parameter(f"side_{k + 1}_rad", float(a), 0.05) for k, a in enumerate(angles)]
-        placed = [Parameter(f"side_{k + 1}_m", float(o), 0.01) for k, o in enumerate(offsets)]
+        turned = [ShapeParameter(f"side_{k + 1}_rad", float(a), 0.05) for k, a in enumerate(angles)]
+        placed = [ShapeParameter(f"side_{k + 1}_m", float(o), 0.01) for k, o in enumerate(offsets)]
         return (*turned, *placed)
-    return (Parameter("grown_m", 0.0, 0.002, -0.006, 0.006),)
+    return (ShapeParameter("grown_m", 0.0, 0.002, -0.006, 0.006),)
 
 
 def _outline_with(outline: Outline, values: np.ndarray) -> Outline:
@@ -48,7 +48,7 @@ class Prism:
 
     name: str
     outline: Outline
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ShapeParameter, ...]
     sloped: bool
     drafted: bool
     complexity: int
@@ -57,11 +57,14 @@ class Prism:
     @classmethod
     def of(cls, outline: Outline, height_m: float, *, sloped: bool, drafted: bool) -> Prism:
         """A first guess over an outline."""
-        found = [*_outline_parameters(outline), Parameter("height_m", height_m, 0.02, 0.002)]
+        found = [*_outline_parameters(outline), ShapeParameter("height_m", height_m, 0.02, 0.002)]
         if sloped:
-            found += [Parameter("slope_x", 0.0, 0.2, -1.5, 1.5), Parameter("slope_y", 0.0, 0.2, -1.5, 1.5)]
+            found += [
+                ShapeParameter("slope_x", 0.0, 0.2, -1.5, 1.5),
+                ShapeParameter("slope_y", 0.0, 0.2, -1.5, 1.5),
+            ]
         if drafted:
-            found.append(Parameter("draft_rad", 0.0, 0.15, -0.3, 0.9))
+            found.append(ShapeParameter("draft_rad", 0.0, 0.15, -0.3, 0.9))
         names = {"circle": "cylinder", "polygon": "block", "curve": "extrusion"}
         complexity = {"circle": 1, "polygon": 1, "curve": 2}[outline.kind] + sloped + drafted
         return cls(names[outline.kind], outline, tuple(found), sloped, drafted, complexity)

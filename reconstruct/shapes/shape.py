@@ -11,7 +11,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ShapeParameter:
     """One number of a shape: what it is, its prior spread (one standard deviation) and its bounds; m, rad or
     1."""
 
@@ -37,7 +37,7 @@ class Shape(Protocol):
     @property
     def faceted(self) -> bool: ...
     @property
-    def parameters(self) -> tuple[Parameter, ...]: ...
+    def parameters(self) -> tuple[ShapeParameter, ...]: ...
 
     def with_values(self, values: np.ndarray) -> Shape:
         """The same shape with other parameter values."""
@@ -50,7 +50,7 @@ class Shape(Protocol):
         """Closed triangle surface: vertices (n, 3), outward triangles (m, 3), base on z = 0."""
 
 
-def with_values(parameters: tuple[Parameter, ...], values: np.ndarray) -> tuple[Parameter, ...]:
+def with_values(parameters: tuple[ShapeParameter, ...], values: np.ndarray) -> tuple[ShapeParameter, ...]:
     """The parameters with other values."""
     return tuple(replace(p, value=float(v)) for p, v in zip(parameters, values, strict=True))
 

@@ -31,7 +31,7 @@ from palpate.reconstruction.shapes.choice import (
     try_shapes,
 )
 from palpate.reconstruction.shapes.drawing import balanced, draw
-from palpate.reconstruction.shapes.fit import LEAST_TOUCHES, Evidence, Seen
+from palpate.reconstruction.shapes.fit import LEAST_TOUCHES, Evidence, ShapeEvidence
 from palpate.reconstruction.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
 from palpate.reconstruction.shapes.polyhedron import (
     gap_to_other_bound,
@@ -296,7 +296,7 @@ def _found(
 
 def _implicit(evidence: Evidence, options: SurfaceOptions, why: str) -> Surface:
     vertices, triangles = implicit_surface(evidence, options.surface_spacing_m)
-    error = implicit_held_out(evidence, Seen.of(evidence))
+    error = implicit_held_out(evidence, ShapeEvidence.of(evidence))
     return Surface(
         vertices=evidence.to_device(vertices),
         triangles=triangles,

@@ -126,7 +126,7 @@ def create(name: str, model: Model, options: RenderOptions, progress: Progress =
     return FemRenderer(model, options, progress=progress)
 
 
-class Field(NamedTuple):
+class FineSurface(NamedTuple):
     """far (v, 3, 3) 1/m and curvature (v,) 1/m at the fine vertices, unit modulus, zero on the base.
 
     curvatures: (v, 2) 1/m the principal ones, convex positive, the greatest first: curvature is their mean,
@@ -145,7 +145,7 @@ class Field(NamedTuple):
     parents: np.ndarray
 
 
-def far_field(model: Model, surface: ContactSurface, compliance: SurfaceCompliance) -> Field:
+def far_field(model: Model, surface: ContactSurface, compliance: SurfaceCompliance) -> FineSurface:
     """Evaluate the compliance at every fine vertex that may be touched.
 
     What is local is the dent's, which goes with the modulus under the tip: where that is not the global one,
@@ -171,4 +171,4 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
     curvatures[touched] = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)
     curvature = curvatures.mean(axis=1)
     curvature[touched] += missed.curvature
-    return Field(far, curvature, curvatures, bracing, softness, parents)
+    return FineSurface(far, curvature, curvatures, bracing, softness, parents)

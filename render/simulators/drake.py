@@ -30,7 +30,7 @@ HEAVY_KG = 1e6
 
 
 @dataclass(frozen=True)
-class Settings:
+class DrakeSettings:
     """timestep_s; damping_s: stiffness damping of the object; sphere_radii: edges of the sphere's mesh, in
     its radii; edge_radii: edges of the object under the tip, in its radii, inf as the model has them;
     relaxation_s: of the contact, as SAP has it; inf: as documented."""
@@ -42,7 +42,7 @@ class Settings:
     relaxation_s: float = np.inf
 
 
-SETTINGS = {DOCUMENTED: Settings(1e-2, 1e-2, 1.0), BEST: Settings(1e-3, 4e-3, 0.15, 0.35, 0.1)}
+SETTINGS = {DOCUMENTED: DrakeSettings(1e-2, 1e-2, 1.0), BEST: DrakeSettings(1e-3, 4e-3, 0.15, 0.35, 0.1)}
 
 
 def vtk_text(mesh: TetMesh) -> str:
@@ -87,18 +87,18 @@ class Drake(SteppedAdapter):
 
         super().__init__(model, options, friction)
 
-    def scene(self, mesh: TetMesh, radius_m: float) -> _Scene:
-        return _Scene(mesh, self.model, self.own, self.stated, radius_m)
+    def scene(self, mesh: TetMesh, radius_m: float) -> _DrakeScene:
+        return _DrakeScene(mesh, self.model, self.own, self.stated, radius_m)
 
-    def touch(self, scene: _Scene, tip: np.ndarray) -> World:
-        return _Touch(scene, tip)
+    def touch(self, scene: _DrakeScene, tip: np.ndarray) -> World:
+        return _DrakeTouch(scene, tip)
 
 
-class _Scene:
+class _DrakeScene:
     """A diagram with the body at rest; every touch has a context of its own."""
 
     def __init__(
-        self, mesh: TetMesh, model: Model, own: Settings, given: dict[str, float], radius_m: float
+        self, mesh: TetMesh, model: Model, own: DrakeSettings, given: dict[str, float], radius_m: float
     ) -> None:
         from pydrake.common import MemoryFile
         from pydrake.geometry import (
@@ -154,10 +154,10 @@ class _Scene:
         self.diagram, self.timestep_s = builder.Build(), own.timestep_s
 
 
-class _Touch(SteppedWorld):
+class _DrakeTouch(SteppedWorld):
     """One touch: the sphere is set to where it was, with the velocity that leads it to where it shall be."""
 
-    def __init__(self, scene: _Scene, tip: np.ndarray) -> None:
+    def __init__(self, scene: _DrakeScene, tip: np.ndarray) -> None:
         from pydrake.systems.analysis import Simulator
 
         super().__init__(tip, scene.timestep_s)

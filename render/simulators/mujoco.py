@@ -34,7 +34,7 @@ HEAVY_KG = 1e3
 
 
 @dataclass(frozen=True)
-class Settings:
+class MujocoSettings:
     """timestep_s; solref_s, damping_ratio: solref of the contact; impedance, impedance_deep: its solimp;
     damping_s: of the flex's elasticity; edge_radii: edges under the tip, in its radii, inf as the model has
     them; skin_m: radius of the flex, by which its surface stands off; material: 1 Saint Venant-Kirchhoff, as
@@ -54,8 +54,8 @@ class Settings:
 
 
 SETTINGS = {
-    DOCUMENTED: Settings(2e-3, 0.02),
-    BEST: Settings(1e-3, 0.004, 1.0, 0.002, 0.35, 0.99, 0.999, 1e-5, 2, 10.0),
+    DOCUMENTED: MujocoSettings(2e-3, 0.02),
+    BEST: MujocoSettings(1e-3, 0.004, 1.0, 0.002, 0.35, 0.99, 0.999, 1e-5, 2, 10.0),
 }
 
 
@@ -158,10 +158,10 @@ class MuJoCo(SteppedAdapter):
         return spec.compile()
 
     def touch(self, scene: Any, tip: np.ndarray) -> World:
-        return _Touch(self._mujoco, scene, tip)
+        return _MujocoTouch(self._mujoco, scene, tip)
 
 
-class _Touch(SteppedWorld):
+class _MujocoTouch(SteppedWorld):
     """One touch."""
 
     def __init__(self, mujoco: Any, model: Any, tip: np.ndarray) -> None:

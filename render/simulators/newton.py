@@ -30,7 +30,7 @@ POISSON_LIMIT = 0.45
 
 
 @dataclass(frozen=True)
-class Settings:
+class NewtonSettings:
     """timestep_s; sweeps: of the solver, a step; contact_n_per_m: of one contact; skin_m: what keeps surfaces
     apart (a particle's radius), by which the sphere is led farther out; damping_s: of the elasticity;
     edge_radii: edges under the tip, in its radii, inf as the model has them."""
@@ -43,7 +43,7 @@ class Settings:
     edge_radii: float = np.inf
 
 
-SETTINGS = {DOCUMENTED: Settings(1 / 600, 10, 1e3), BEST: Settings(1e-3, 20, 3e3, edge_radii=0.5)}
+SETTINGS = {DOCUMENTED: NewtonSettings(1 / 600, 10, 1e3), BEST: NewtonSettings(1e-3, 20, 3e3, edge_radii=0.5)}
 
 
 class Newton(SteppedAdapter):
@@ -80,18 +80,24 @@ class Newton(SteppedAdapter):
         self._warp.config.log_level = self._warp.LOG_WARNING
         super().__init__(model, options, friction)
 
-    def scene(self, mesh: TetMesh, radius_m: float) -> _Scene:
-        return _Scene(self._newton, self._warp, mesh, self.own, self.stated, radius_m)
+    def scene(self, mesh: TetMesh, radius_m: float) -> _NewtonScene:
+        return _NewtonScene(self._newton, self._warp, mesh, self.own, self.stated, radius_m)
 
-    def touch(self, scene: _Scene, tip: np.ndarray) -> World:
-        return _Touch(scene, tip)
+    def touch(self, scene: _NewtonScene, tip: np.ndarray) -> World:
+        return _NewtonTouch(scene, tip)
 
 
-class _Scene:
+class _NewtonScene:
     """A model with its solver; the sphere's radius is less by the skin that is around the object."""
 
     def __init__(
-        self, newton: Any, warp: Any, mesh: TetMesh, own: Settings, given: dict[str, float], radius_m: float
+        self,
+        newton: Any,
+        warp: Any,
+        mesh: TetMesh,
+        own: NewtonSettings,
+        given: dict[str, float],
+        radius_m: float,
     ) -> None:
         young, nu, mu = given["young_modulus_pa"], given["poisson_ratio"], given["friction"]
         stiff = own.contact_n_per_m
@@ -122,10 +128,10 @@ class _Scene:
         self.seen = self.solver.observables({"contact_f"}, contacts=self.contacts)
 
 
-class _Touch(SteppedWorld):
+class _NewtonTouch(SteppedWorld):
     """One touch: two states that take turns."""
 
-    def __init__(self, scene: _Scene, tip: np.ndarray) -> None:
+    def __init__(self, scene: _NewtonScene, tip: np.ndarray) -> None:
         super().__init__(tip, scene.timestep_s)
         self._scene, self._now, self._then = scene, scene.model.state(), scene.model.state()
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Settings:
+class ScikitFemSettings:
     """penalty: a node's contact spring over the stiffness of the object under one node, no part of
     scikit-fem. order: 1 or 2, of the elements. edge_radii: edges under the tip, in its radii, inf as the
     model has them."""
@@ -39,7 +39,7 @@ class Settings:
     edge_radii: float = math.inf
 
 
-SETTINGS = {DOCUMENTED: Settings(10.0), BEST: Settings(30.0, 2, 0.45)}
+SETTINGS = {DOCUMENTED: ScikitFemSettings(10.0), BEST: ScikitFemSettings(30.0, 2, 0.45)}
 NEAR_RADII = 1.05
 """Of the tip: nodes so near to its centre may touch, as what it presses moves away from it."""
 MOVED_M = 2e-5
@@ -85,7 +85,7 @@ class ScikitFem(Adapter):
         if solved is None:
             fine = self.mesh_around(tip, radius_m, self.own.edge_radii * radius_m, 1.1 * radius_m)
             solved = _Solved(fine, self.model, round(self.own.order))
-        return _Touch(solved, radius_m, self.friction, self.own.penalty)
+        return _ScikitFemTouch(solved, radius_m, self.friction, self.own.penalty)
 
 
 class _Solved:
@@ -140,7 +140,7 @@ def _factorised(matrix: Any) -> Any:
     return splu(csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
 
-class _Touch:
+class _ScikitFemTouch:
     """A sphere on nodes: springs along the sphere's normal, and across it until they slip."""
 
     def __init__(self, solved: _Solved, radius_m: float, friction: float, penalty: float) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.mechanics.options import option
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.recording.segments import Segment
+from palpate.mechanics.recording.segments import TimeSegment
 from palpate.scenes.laboratory.curves import Solving
 from palpate.scenes.laboratory.effects import Readings, effect
 from palpate.scenes.laboratory.effects.solid import scaled
@@ -213,7 +213,7 @@ class Session:
             tip_radius_m=options.tip_radius_m,
             quaternion=quaternions(readings.axes),
             boundary_phase=(round(self.way.phase[0], 2), round(self.way.phase[1], 2)),
-            segments=tuple(Segment(kind, round(a, 2), round(b, 2)) for kind, a, b in self.way.beside),
+            segments=tuple(TimeSegment(kind, round(a, 2), round(b, 2)) for kind, a, b in self.way.beside),
             force_noise_std_n=options.force_noise_std_n,
             position_resolution_m=step,
             object_name=self.phantom.name,

@@ -43,7 +43,7 @@ SUMMARY = Kind("a batch's summary", (",".join(COLUMNS[:3]).encode(),))
 
 
 @dataclass(frozen=True)
-class Entry:
+class BatchEntry:
     """A recording's row, and what the page shows beside it. values: step -> what its function returned;
     cost: step -> (CPU s, peak bytes); trace: of an error that nobody foresaw; object: as the recording calls
     it, None where it does not."""
@@ -94,7 +94,7 @@ class Batch(Result):
     """
 
     folder: Path
-    entries: tuple[Entry, ...]
+    entries: tuple[BatchEntry, ...]
     agreements: tuple[Agreement, ...]
     tasks: int
     reused: int
@@ -128,11 +128,11 @@ class Batch(Result):
         return len(self.entries)
 
 
-def entry_of(name: str, outcomes: Mapping[str, Outcome], bad: str | None, steps: Sequence[str]) -> Entry:
+def entry_of(name: str, outcomes: Mapping[str, Outcome], bad: str | None, steps: Sequence[str]) -> BatchEntry:
     """The entry of one recording. outcomes: step -> outcome, of those that ended; bad: why it could not even
     be planned."""
     if bad is not None:
-        return Entry(Row(name, "failed", bad), {}, {})
+        return BatchEntry(Row(name, "failed", bad), {}, {})
     records = {step: o.record for step, o in outcomes.items() if o.record is not None}
     values: dict[str, Mapping[str, Any]] = {step: record.value for step, record in records.items()}
     failed = [o for o in outcomes.values() if o.state == "failed"]
@@ -156,10 +156,10 @@ def entry_of(name: str, outcomes: Mapping[str, Outcome], bad: str | None, steps:
         seconds=round(sum(record.seconds for record in records.values()), 3),
     )
     cost = {step: (record.cpu_s, record.peak_bytes) for step, record in records.items()}
-    return Entry(row, values, cost, "\n".join(o.trace for o in failed if o.trace))
+    return BatchEntry(row, values, cost, "\n".join(o.trace for o in failed if o.trace))
 
 
-def agreements(entries: Sequence[Entry]) -> list[Agreement]:
+def agreements(entries: Sequence[BatchEntry]) -> list[Agreement]:
     """Of every object with two explorations or more whose moduli are known, the most explored first."""
     by_object: dict[str, list[Row]] = {}
     for entry in entries:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from palpate.importing.mapping import ROLES, Column, Said, time_of
-from palpate.importing.meaning import MOST_ODDS, Reading, clock_of, clock_starts, joined, settled_clock
+from palpate.importing.meaning import MOST_ODDS, BestReading, clock_of, clock_starts, joined, settled_clock
 from palpate.importing.tables import Table
 from palpate.mechanics.errors import RecordingError
 from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
@@ -79,7 +79,7 @@ def _in_order(
     blocks = len(clock_starts(t))
     if blocks == 1:
         return t, values
-    reading = clock_of(t, values) if blocks <= len(t) // 4 else Reading((1,), MOST_ODDS)
+    reading = clock_of(t, values) if blocks <= len(t) // 4 else BestReading((1,), MOST_ODDS)
     reading = settled_clock(part, t, said.clock, reading)
     if reading.value[0] < 0:
         notes.append(

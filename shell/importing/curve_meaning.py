@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.importing.mapping import Column
 from palpate.importing.meaning import (
-    Reading,
+    BestReading,
     Unclear,
     best,
     press_scores,
@@ -40,7 +40,9 @@ class RawCurves:
     columns: Mapping[str, Column]
 
 
-def signs_of(raws: Sequence[RawCurves], said: SaidOfCurves, stated: tuple[int | None, int | None]) -> Reading:
+def signs_of(
+    raws: Sequence[RawCurves], said: SaidOfCurves, stated: tuple[int | None, int | None]
+) -> BestReading:
     """(travel, load) signs of all files together, which are of one machine."""
     scores: dict[tuple[int, ...], float] = {(a, b): 0.0 for a in (1, -1) for b in (1, -1)}
     for raw in raws:
@@ -58,7 +60,7 @@ def signs_of(raws: Sequence[RawCurves], said: SaidOfCurves, stated: tuple[int | 
     return best(kept)
 
 
-def unclear_signs(raw: RawCurves, signs: Reading) -> RecordingError:
+def unclear_signs(raw: RawCurves, signs: BestReading) -> RecordingError:
     z, fz = raw.columns["z"].name, raw.columns["fz"].name
     return Unclear(
         f"'{raw.path}': whether '{fz}' is positive or negative in compression cannot be told from how it "
@@ -69,7 +71,7 @@ def unclear_signs(raw: RawCurves, signs: Reading) -> RecordingError:
     )
 
 
-def say_signs(raw: RawCurves, signs: Reading, notes: list[str]) -> None:
+def say_signs(raw: RawCurves, signs: BestReading, notes: list[str]) -> None:
     travel, load = signs.value
     z, fz = raw.columns["z"].name, raw.columns["fz"].name
     way = "into the sample" if travel > 0 else "out of the sample"
@@ -78,8 +80,8 @@ def say_signs(raw: RawCurves, signs: Reading, notes: list[str]) -> None:
 
 
 def in_units(
-    raw: RawCurves, curves: Sequence[Curve], tip_radius_m: float, notes: list[str], odds: list[float]
-) -> list[Curve]:
+    raw: RawCurves, curves: Sequence[MachineCycle], tip_radius_m: float, notes: list[str], odds: list[float]
+) -> list[MachineCycle]:
     """The curves in the units that their dent and stiffness tell, where nobody said them. Raises Unclear
     where two may be meant, ContactError where no tip goes so deep."""
     depth, push = (float(np.median(v)) for v in zip(*map(_dent, curves), strict=True))
@@ -101,7 +103,7 @@ def in_units(
         force = _likely(moduli, _FORCES, _E_FACTOR, "force", raw, notes, odds)
     if length == force == 1.0:
         return list(curves)
-    return [Curve(c.t, length * c.travel, force * c.force, c.name) for c in curves]
+    return [MachineCycle(c.t, length * c.travel, force * c.force, c.name) for c in curves]
 
 
 def _likely(
@@ -135,7 +137,7 @@ _FORCES = {"N": 0.85, "mN": 0.1, "gf": 0.05}
 """Units that a column may be in that says none."""
 
 
-def _dent(curve: Curve) -> tuple[float, float]:
+def _dent(curve: MachineCycle) -> tuple[float, float]:
     """(depth m, force N) of a press at its peak."""
     force = curve.force - np.median(curve.force[: max(3, len(curve.force) // 50)])
     peak = int(np.argmax(force))

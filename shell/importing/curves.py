@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.importing.curve_meaning import (
     RawCurves,
     SaidOfCurves,
@@ -58,7 +58,7 @@ class CurvesRead:
     """curves: one a press, travel into the sample, force that pushes the tip out. notes: what was understood
     beyond the headers; odds: of the least sure of it."""
 
-    curves: tuple[Curve, ...]
+    curves: tuple[MachineCycle, ...]
     notes: tuple[str, ...]
     odds: float
 
@@ -192,7 +192,7 @@ def _check_sizes(raw: RawCurves) -> None:
         )
 
 
-def _presses(raw: RawCurves, travel: int, load: int, notes: list[str]) -> list[Curve]:
+def _presses(raw: RawCurves, travel: int, load: int, notes: list[str]) -> list[MachineCycle]:
     """A curve a press: cut where the tip is farthest out between two."""
     u, f = travel * raw.position, load * raw.load
     level = np.median(f[: max(3, len(f) // 50)])
@@ -214,10 +214,11 @@ def _presses(raw: RawCurves, travel: int, load: int, notes: list[str]) -> list[C
     if len(spans) > 1 and f[slice(*spans[0])].max() - level < _ENTER * top:
         spans = [(spans[0][0], spans[1][1]), *spans[2:]]
     if len(spans) < 2:
-        return [Curve(raw.t, u, f, raw.path.name)]
+        return [MachineCycle(raw.t, u, f, raw.path.name)]
     notes.append(f"'{raw.path.name}' holds {len(spans)} presses")
     return [
-        Curve(raw.t[a:b], u[a:b], f[a:b], f"{raw.path.name}, press {k + 1}") for k, (a, b) in enumerate(spans)
+        MachineCycle(raw.t[a:b], u[a:b], f[a:b], f"{raw.path.name}, press {k + 1}")
+        for k, (a, b) in enumerate(spans)
     ]
 
 

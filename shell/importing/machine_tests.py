@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.result import MachineTests
 from palpate.importing.curve_meaning import SaidOfCurves
 from palpate.importing.curves import LEAST_ROWS, numbers_in, read_curves, stated_radius
@@ -107,7 +107,7 @@ def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCur
     curves, stated, notes, odds = [], [], [], MOST_ODDS
     for path in (p for p, own in zip(paths, chiaro, strict=True) if own):
         data = read_chiaro(path)
-        curves.append(Curve(data.t, data.travel, data.force, path.name))
+        curves.append(MachineCycle(data.t, data.travel, data.force, path.name))
         tip_radius_m = tip_radius_m or data.tip_radius_m
         stated.append(data.stated_modulus_pa)
     others = [p for p, own in zip(paths, chiaro, strict=True) if not own]

@@ -28,30 +28,30 @@ import numpy as np
 from palpate.importing.tables import Table
 from palpate.importing.units import SI, plain, unit_in, without_unit
 from palpate.mechanics.disk.reading import read_toml
-from palpate.mechanics.disk.schema import ANY, Key, Schema, check_table
+from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.recording.files import SCHEMA
 
 ROLES = ("t", "x", "y", "z", "fx", "fy", "fz", "qw", "qx", "qy", "qz")
 KIND = {"t": "time", **dict.fromkeys("xyz", "position"), **dict.fromkeys(("fx", "fy", "fz"), "force")}
 _NUMBERS = {
-    "tip_radius_m": Key(low=1e-9, high=0.1, unit="m"),
-    "mass_kg": Key(low=0.0, high=5.0, unit="kg"),
-    "flange_to_tip_m": Key(low=-2.0, high=2.0, size=3, unit="m"),
-    "rate_hz": Key(low=1e-3, high=1e6, unit="Hz"),
-    "tare_s": Key(size=2, unit="s"),
+    "tip_radius_m": FileKey(low=1e-9, high=0.1, unit="m"),
+    "mass_kg": FileKey(low=0.0, high=5.0, unit="kg"),
+    "flange_to_tip_m": FileKey(low=-2.0, high=2.0, size=3, unit="m"),
+    "rate_hz": FileKey(low=1e-3, high=1e6, unit="Hz"),
+    "tare_s": FileKey(size=2, unit="s"),
 }
 _SCHEMA: Schema = {
     "columns": dict.fromkeys(ROLES),
-    "units": dict.fromkeys(SI, Key(str)),
+    "units": dict.fromkeys(SI, FileKey(str)),
     "tool": {name: _NUMBERS[name] for name in ("tip_radius_m", "mass_kg", "flange_to_tip_m")},
     "sensor": {
-        "force_on": Key(str, choices=("tool", "object")),
-        "frame": Key(str, choices=("device", "tool")),
+        "force_on": FileKey(str, choices=("tool", "object")),
+        "frame": FileKey(str, choices=("device", "tool")),
         "rotation": ANY,
     },
     "clock": {"offset_s": ANY, "rate_hz": _NUMBERS["rate_hz"]},
-    "tare": {"start_s": Key(unit="s"), "end_s": Key(unit="s", required=True)},
+    "tare": {"start_s": FileKey(unit="s"), "end_s": FileKey(unit="s", required=True)},
     "object": {
         key: form
         for key, form in SCHEMA["object"].items()  # type: ignore[union-attr]

@@ -39,7 +39,7 @@ class Unclear(RecordingError):
 
 
 @dataclass(frozen=True)
-class Reading:
+class BestReading:
     """The best of several readings. value: which; odds: against all others together."""
 
     value: tuple[int, ...]
@@ -56,12 +56,12 @@ class Reading:
         return f"odds over {MOST_ODDS:g} to 1" if self.odds >= MOST_ODDS else f"odds {self.odds:.3g} to 1"
 
 
-def best(scores: Mapping[tuple[int, ...], float]) -> Reading:
+def best(scores: Mapping[tuple[int, ...], float]) -> BestReading:
     """The likeliest of some readings by their log likelihoods (nats)."""
     value = max(scores, key=lambda key: scores[key])
     rest = [score - scores[value] for key, score in scores.items() if key != value]
     against = float(np.exp(rest).sum()) if rest else 0.0
-    return Reading(value, min(1 / max(against, 1e-300), MOST_ODDS))
+    return BestReading(value, min(1 / max(against, 1e-300), MOST_ODDS))
 
 
 def press_scores(position: np.ndarray, load: np.ndarray) -> dict[tuple[int, ...], float]:
@@ -114,7 +114,7 @@ def _contact_misfit(u: np.ndarray, f: np.ndarray) -> float:
     return max(lowest, 0.0) / whole
 
 
-def force_sense(position: np.ndarray, force: np.ndarray) -> Reading:
+def force_sense(position: np.ndarray, force: np.ndarray) -> BestReading:
     """Whose force it is: ((1,): on the tool, (-1,): on the object) of a path (n, 3) m and its force (n, 3).
 
     Against whatever is elastic the force on the tool grows as the tip moves against it: the score is the
@@ -128,7 +128,7 @@ def force_sense(position: np.ndarray, force: np.ndarray) -> Reading:
     touching = size > 0.2 * np.quantile(size, 0.99)
     both = touching[1:] & touching[:-1]
     if both.sum() < 3:
-        return Reading((1,), 1.0)
+        return BestReading((1,), 1.0)
     along = f[1:] + f[:-1]
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
     pressed = -(np.diff(p, axis=0) * along).sum(1)[both]
@@ -143,11 +143,11 @@ def clock_starts(t: np.ndarray) -> np.ndarray:
     return np.concatenate([[0], np.flatnonzero(np.diff(t) < 0) + 1])
 
 
-def clock_of(t: np.ndarray, values: np.ndarray) -> Reading:
+def clock_of(t: np.ndarray, values: np.ndarray) -> BestReading:
     """((1,): one clock whose rows are out of order, (-1,): blocks with clocks of their own) of times (n,) and
     what was read then (n, k): of the right order it is the smoother."""
     if len(clock_starts(t)) == 1:
-        return Reading((1,), MOST_ODDS)
+        return BestReading((1,), MOST_ODDS)
     scaled = (values - values.mean(0)) / np.maximum(np.ptp(values, axis=0), 1e-300)
     in_time, as_written = (
         float(np.abs(np.diff(scaled[order], axis=0)).sum()) for order in (np.argsort(t, kind="stable"), ...)
@@ -160,11 +160,11 @@ def clock_of(t: np.ndarray, values: np.ndarray) -> Reading:
     return best({(1,): log_odds / 2, (-1,): -log_odds / 2})
 
 
-def settled_clock(where: str, t: np.ndarray, stated: str | None, reading: Reading) -> Reading:
+def settled_clock(where: str, t: np.ndarray, stated: str | None, reading: BestReading) -> BestReading:
     """The clock as it was stated ("one" or "blocks"), else as it was read. Raises Unclear where neither is
     sure; where: what the line begins with."""
     if stated is not None:
-        return Reading((1 if stated == "one" else -1,), MOST_ODDS)
+        return BestReading((1 if stated == "one" else -1,), MOST_ODDS)
     if not reading.sure:
         blocks = len(clock_starts(t))
         raise Unclear(

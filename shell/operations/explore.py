@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.explore.candidates import ReachOptions
-from palpate.diagnosis.explore.explorer import Explorer, State, Suggestion
+from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Suggestion
 from palpate.diagnosis.explore.goals import GoalOptions, check_goals
 from palpate.diagnosis.explore.segments import Instrument
 from palpate.diagnosis.explore.suggestion import Explored
@@ -210,7 +210,7 @@ def _on_phantom(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: R
     return explorer.explored(asked.output, None if robot.last is None else robot.last.truth)
 
 
-def _line(suggestion: Suggestion, state: State) -> str:
+def _line(suggestion: Suggestion, state: ExplorationState) -> str:
     """One touch a line: what is known, what comes next, why."""
     known = "nothing is known yet"
     if state.presses and state.surface:

@@ -89,7 +89,7 @@ class TouchOperands:
 
 
 @dataclass(frozen=True)
-class Touched:
+class ServoRun:
     """What the servo did. failure: what stopped it, '' where nothing did."""
 
     scene: Scene
@@ -106,7 +106,7 @@ class Touched:
         return [f"{self.scene.title}: {self.renderer}, {self.device}", report, *recorded]
 
 
-def _answer(touched: Touched | None, asked: TouchOperands, out: Output) -> int:
+def _answer(touched: ServoRun | None, asked: TouchOperands, out: Output) -> int:
     if touched is not None:
         follows = f"see what it holds: palpate check {touched.record}" if touched.record else _NOT_RECORDED
         out.say(*touched.lines(), f"next: {follows}")
@@ -130,7 +130,7 @@ def _answer(touched: Touched | None, asked: TouchOperands, out: Output) -> int:
     answer=_answer,
     progress=False,
 )
-def touch(asked: TouchOperands, call: Call) -> Touched | None:
+def touch(asked: TouchOperands, call: Call) -> ServoRun | None:
     """Open, touch, close; None where the window was closed before the touch began."""
     name = asked.device or ("simulated" if asked.headless else "mouse")
     _check(asked, name)
@@ -144,7 +144,7 @@ def touch(asked: TouchOperands, call: Call) -> Touched | None:
         return _in_window(opening) if not asked.headless else _without(opening)
 
 
-def _without(opening: _Opening) -> Touched:
+def _without(opening: _Opening) -> ServoRun:
     """Touch without a window."""
     asked = opening.asked
     scene = opening.scene(asked.scene or DEFAULT)
@@ -201,13 +201,13 @@ class _Opening:
         opened.start(lambda stage, share: tell(stage, 0.5 + 0.5 * share), compiled=compiled)
         return session, until
 
-    def touched(self, session: TouchSession, scene: Scene) -> Touched:
+    def touched(self, session: TouchSession, scene: Scene) -> ServoRun:
         """What was done."""
         report, failure = session.report(), session.servo.failure
-        return Touched(scene, self.device, session.renderer_name, report, self.asked.record, failure)
+        return ServoRun(scene, self.device, session.renderer_name, report, self.asked.record, failure)
 
 
-def _in_window(opening: _Opening) -> Touched | None:
+def _in_window(opening: _Opening) -> ServoRun | None:
     """A window from the first moment on, where a scene is chosen and which shows how the preparation comes
     along; then the touch, of one scene after the other. None where a person closes it before."""
     asked = opening.asked

@@ -17,7 +17,7 @@ from palpate.devices.safety import (
     LONGEST_GAP_S,
     PASSIVITY,
     SILENT,
-    Reading,
+    RawPose,
     SafetyParameters,
     SafetyState,
     safety_state,
@@ -221,7 +221,7 @@ def after(
         dt_s,
         age_s,
     )
-    reading = Reading(
+    reading = RawPose(
         position,
         pose[IN_VELOCITY : IN_VELOCITY + 3],
         age_s,

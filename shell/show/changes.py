@@ -11,7 +11,7 @@ from palpate.diagnosis.compare.before_after import Changes, Side
 from palpate.show.diagnosis.words import verdict
 from palpate.show.model import thing_of, usual_colourings
 from palpate.show.page import Page, file_words, new_figure
-from palpate.show.quantities import Quantity
+from palpate.show.quantities import ShownQuantity
 from palpate.show.scenery import add_dots, add_object
 from palpate.show.view3d import Colouring, View
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from pyvista import Plotter
 
 _COLOURS = ("#1d3557", "#c1121f")
-_RATIO = Quantity("second over first modulus", "", 1.0, "coolwarm", least_share=0.2)
+_RATIO = ShownQuantity("second over first modulus", "", 1.0, "coolwarm", least_share=0.2)
 
 
 def lines(result: Changes) -> list[str]:

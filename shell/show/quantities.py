@@ -10,7 +10,7 @@ from palpate.mechanics.quantities import prefixed
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ShownQuantity:
     """name: in words; unit: that people read, '' for a count; scale: to it from SI; colour_map: its own.
     least_share: of the middle value, that the colours span at least, so that 2 % look like 2 %."""
 
@@ -37,13 +37,13 @@ class Quantity:
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
-ORDER = Quantity("first touches, in order", "", 1.0, "plasma")
-DEPTH = Quantity("greatest depth", "mm", 1e3, "YlGnBu")
-ERROR = Quantity("force error", "mN", 1e3, "magma_r")
-STIFFNESS = Quantity("own stiffness", "N/m", 1.0, "viridis")
-KELVIN_VOIGT = Quantity("stiffness k_V of a press", "N/m", 1.0, "viridis")
-MODULUS = Quantity("modulus", "kPa", 1e-3, "cividis", least_share=0.5)
-UNCERTAINTY = Quantity("shape uncertainty", "mm", 1e3, "Purples")
+ORDER = ShownQuantity("first touches, in order", "", 1.0, "plasma")
+DEPTH = ShownQuantity("greatest depth", "mm", 1e3, "YlGnBu")
+ERROR = ShownQuantity("force error", "mN", 1e3, "magma_r")
+STIFFNESS = ShownQuantity("own stiffness", "N/m", 1.0, "viridis")
+KELVIN_VOIGT = ShownQuantity("stiffness k_V of a press", "N/m", 1.0, "viridis")
+MODULUS = ShownQuantity("modulus", "kPa", 1e-3, "cividis", least_share=0.5)
+UNCERTAINTY = ShownQuantity("shape uncertainty", "mm", 1e3, "Purples")
 FROM_ZERO = (ERROR, UNCERTAINTY, DEPTH)
 """Whose colours begin at nothing."""
 

@@ -22,7 +22,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.render.base import Renderer
 from palpate.render.surface.felt_surface import felt_surface
-from palpate.show.quantities import Quantity
+from palpate.show.quantities import ShownQuantity
 
 if TYPE_CHECKING:
     import pyvista
@@ -43,7 +43,7 @@ class Colours:
     """values: (v,) one a point of the felt surface, in the quantity's own unit; limits: of the colours."""
 
     values: np.ndarray
-    quantity: Quantity
+    quantity: ShownQuantity
     limits: tuple[float, float] | None = None
 
 

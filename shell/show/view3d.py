@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.show.quantities import ORDER, Quantity
+from palpate.show.quantities import ORDER, ShownQuantity
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, level_axes, spread_over
 
 _SHOWN_SHARE = (2.0, 98.0)
@@ -198,7 +198,7 @@ class Colouring:
     known; presses (p,) one a press. Of presses alone the surface takes what is near, and fades where nobody
     touched. words: what the numbers are, if that is not plain. name: instead of the quantity's."""
 
-    quantity: Quantity
+    quantity: ShownQuantity
     surface: np.ndarray | None = None
     presses: np.ndarray | None = None
     words: str = ""

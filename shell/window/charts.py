@@ -21,7 +21,7 @@ from palpate.window.lettering import set_type
 from palpate.window.widgets import ACCENT, GREY, SECOND
 
 
-class Trace:
+class ForceTrace:
     """Rows of (time s, force N, depth m, second renderer's force N), the newest `seconds` of them."""
 
     COLUMNS = 4
@@ -52,7 +52,7 @@ LENGTH, ROOM = 26.0, 12.0
 COLOURS = {"x": "#b3261e", "y": "#2e7d32", "z": "#1b4f9c"}
 
 
-class Axes:
+class AxesGizmo:
     """In a renderer's lower left corner; `update` turns them with the eye."""
 
     def __init__(self, renderer: vtkRenderer) -> None:
@@ -140,7 +140,7 @@ class LiveCharts:
         for line in self._lines[count:]:
             line.visible = False
 
-    def update(self, trace: Trace) -> None:
+    def update(self, trace: ForceTrace) -> None:
         """Redraw from the trace; the range grows with the greatest value shown."""
         curves = trace.curves()
         if len(curves) < 2:

@@ -17,7 +17,7 @@ HALF_TIME_S = 60.0
 
 
 @dataclass(frozen=True)
-class Answer:
+class Guess:
     """renderer: what was felt. off_m: beside the nodule's middle, seen along `up`. score: 0 to 100."""
 
     renderer: str
@@ -31,7 +31,7 @@ class Game:
 
     def __init__(self, hidden: Sequence[Ball], up: np.ndarray) -> None:
         self.hidden = tuple(hidden)
-        self.answers: list[Answer] = []
+        self.answers: list[Guess] = []
         self._up = np.asarray(up, dtype=float)
         self._started_s: float | None = None
         self._touching = False
@@ -51,7 +51,7 @@ class Game:
         """Since this round's first touch."""
         return 0.0 if self._started_s is None else now_s - self._started_s
 
-    def answer(self, point_m: np.ndarray, now_s: float, renderer: str) -> Answer | None:
+    def answer(self, point_m: np.ndarray, now_s: float, renderer: str) -> Guess | None:
         """The nodule is under `point_m` (3,); None where nothing was touched in this round."""
         if self._started_s is None:
             return None
@@ -59,7 +59,7 @@ class Game:
         offs = [self._off(point_m, ball) for ball in self.hidden]
         nearest = int(np.argmin(offs))
         halvings = offs[nearest] / self.hidden[nearest].radius_m + seconds / HALF_TIME_S
-        self.answers.append(Answer(renderer, offs[nearest], seconds, 100.0 * 0.5**halvings))
+        self.answers.append(Guess(renderer, offs[nearest], seconds, 100.0 * 0.5**halvings))
         return self.answers[-1]
 
     def _off(self, point_m: np.ndarray, ball: Ball) -> float:

@@ -18,7 +18,7 @@ import numpy as np
 import pyvista
 from scipy.spatial import cKDTree
 
-from palpate.diagnosis.explore.explorer import Explorer, State, Suggestion
+from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Suggestion
 from palpate.diagnosis.explore.segments import Segment
 from palpate.mechanics.model.model import Model
 from palpate.servo import Servo
@@ -166,7 +166,7 @@ class Guide:
         self._first: int | None = None
         self._last_touch: int | None = None
         self._suggestion: Suggestion = explorer.suggest()
-        self._state: State = explorer.state
+        self._state: ExplorationState = explorer.state
 
     @property
     def suggestion(self) -> Suggestion:
@@ -174,7 +174,7 @@ class Guide:
         return self._suggestion
 
     @property
-    def state(self) -> State:
+    def state(self) -> ExplorationState:
         """What is known, by all that was taken in."""
         return self._state
 

@@ -71,7 +71,7 @@ class MovingInclusion:
         points, triangles = compliance.own_points, compliance.own_triangles
         _, triangle, self._weights = closest(points, triangles, vertices)
         self._corners = triangles[triangle]
-        self._region: inclusion.Region | None = None
+        self._region: inclusion.StiffenedElements | None = None
 
     def write(self, region: Region | None, path: Path, progress: Progress = silent) -> FieldChange:
         """The change that a ball makes, None: the plain object. Solves only for elements not met before."""
@@ -87,7 +87,9 @@ class MovingInclusion:
         if not len(elements):  # outside the object
             return self._plain_far, self._blocks
         if self._region is None:
-            self._region = inclusion.Region(self._solver, elements, self._outputs, progress=progress)
+            self._region = inclusion.StiffenedElements(
+                self._solver, elements, self._outputs, progress=progress
+            )
         else:
             self._region.extend(elements, progress)
         basis, change = self._region.change(ratio[self._region.elements])

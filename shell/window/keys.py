@@ -20,33 +20,33 @@ from palpate.window.worker import level
 
 
 @dataclass(frozen=True)
-class Key:
+class KeyBinding:
     """does: for help and a button's tip. button: its words, '' for a key without a button."""
 
     does: str
     button: str = ""
 
 
-KEYS: dict[str, Key] = {
-    "Return": Key("The nodule is where the tip is", "It is here"),
-    "b": Key("Show a second renderer under the same tip, or only what you feel", "Side by side"),
-    "Tab": Key("Feel the next renderer", "Next renderer"),
-    "c": Key("Colour by the stiffness of a 3 mm press, or by displacement", "Stiffness map"),
-    "i": Key("Put a stiff ball under the tip, or take it out", "Stiff ball"),
-    "r": Key("Record what you do; again: write the recording", "Record"),
-    "p": Key("Save this window as a picture", "Save picture"),
-    "v": Key("Look from where you began", "First view"),
-    "space": Key("Switch the device's force on or off", "Force"),
-    "s": Key("Renderer, friction, stiffness, depth, effects", "Settings"),
-    "h": Key("What mouse and keys do", "Help"),
-    "g": Key("Leave this object and choose another", "Scenes"),
-    "q": Key("Force off, and close the window", "Quit"),
-    "plus": Key("Stiffer by a quarter"),
-    "minus": Key("Softer by a fifth"),
-    "bracketleft": Key("Press less deep"),
-    "bracketright": Key("Press deeper"),
-    "f": Key("Next friction: stick, 1, 0.5, 0.2, 0.05"),
-    "arrows": Key("Move the ball, with PageUp and PageDown in height"),
+KEYS: dict[str, KeyBinding] = {
+    "Return": KeyBinding("The nodule is where the tip is", "It is here"),
+    "b": KeyBinding("Show a second renderer under the same tip, or only what you feel", "Side by side"),
+    "Tab": KeyBinding("Feel the next renderer", "Next renderer"),
+    "c": KeyBinding("Colour by the stiffness of a 3 mm press, or by displacement", "Stiffness map"),
+    "i": KeyBinding("Put a stiff ball under the tip, or take it out", "Stiff ball"),
+    "r": KeyBinding("Record what you do; again: write the recording", "Record"),
+    "p": KeyBinding("Save this window as a picture", "Save picture"),
+    "v": KeyBinding("Look from where you began", "First view"),
+    "space": KeyBinding("Switch the device's force on or off", "Force"),
+    "s": KeyBinding("Renderer, friction, stiffness, depth, effects", "Settings"),
+    "h": KeyBinding("What mouse and keys do", "Help"),
+    "g": KeyBinding("Leave this object and choose another", "Scenes"),
+    "q": KeyBinding("Force off, and close the window", "Quit"),
+    "plus": KeyBinding("Stiffer by a quarter"),
+    "minus": KeyBinding("Softer by a fifth"),
+    "bracketleft": KeyBinding("Press less deep"),
+    "bracketright": KeyBinding("Press deeper"),
+    "f": KeyBinding("Next friction: stick, 1, 0.5, 0.2, 0.05"),
+    "arrows": KeyBinding("Move the ball, with PageUp and PageDown in height"),
 }
 """By name; palpate.window.mouse_and_keys maps VTK's key symbols to these."""
 

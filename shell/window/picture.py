@@ -20,7 +20,7 @@ from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
 from palpate.window.widgets import INK
-from palpate.window.worker import Frame, View
+from palpate.window.worker import Frame, RendererView
 
 ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02
@@ -159,7 +159,7 @@ class ObjectPicture:
             self._ball.SetPosition(*region.centre_m)
             self._ball.SetScale(region.radius_m)
 
-    def update(self, frame: Frame, view: View, below: Target | None = None) -> None:
+    def update(self, frame: Frame, view: RendererView, below: Target | None = None) -> None:
         """Move surface, tip and arrow to a frame; below: what the tip's shadow falls on."""
         moved = view.displacement_m
         if len(moved) == len(self._rest) and not np.array_equal(moved, self._moved):

@@ -31,11 +31,11 @@ from palpate.render.scene import scene_of
 from palpate.scenes.phantoms import Region
 from palpate.servo import Servo, ServoOptions, ServoReport, ServoSnapshot
 from palpate.servo.started import StartedServo
-from palpate.window.charts import Trace
+from palpate.window.charts import ForceTrace
 from palpate.window.inclusion import InclusionMover
 from palpate.window.recording import SessionRecording
 from palpate.window.window_renderers import Beside, DrawnRenderers
-from palpate.window.worker import Frame, View, Worker
+from palpate.window.worker import Frame, RendererView, Worker
 
 BESIDE = "hunt-crossley"
 """The second renderer where nobody said which."""
@@ -73,7 +73,7 @@ class TouchSession:
         asked = options or SessionOptions()
         self.model = model
         self.title = title
-        self.trace = Trace()
+        self.trace = ForceTrace()
         self._inclusion = InclusionMover(model)
         self._drawn = DrawnRenderers(model, asked.render, self._inclusion)
         self.friction = rendered_touch(model, asked.render).friction
@@ -175,7 +175,7 @@ class TouchSession:
             return None
         self._add_to_trace(rows, sizes)
         felt = snapshot.forces_n.sum(axis=0)
-        views = [View(self.renderer_name, felt, self._displacement(snapshot))]
+        views = [RendererView(self.renderer_name, felt, self._displacement(snapshot))]
         if beside is not None:
             views.append(beside.view())
         return Frame(

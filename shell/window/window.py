@@ -20,7 +20,7 @@ from palpate.devices.channel import PoseChannel
 from palpate.mechanics.disk.writing import PNG, atomic_file
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene
-from palpate.window.charts import Axes, LiveCharts
+from palpate.window.charts import AxesGizmo, LiveCharts
 from palpate.window.game import Game
 from palpate.window.guide import GhostTip
 from palpate.window.keys import Orbit
@@ -31,7 +31,7 @@ from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
 from palpate.window.widgets import PAPER, Board, Item
-from palpate.window.worker import Frame, Pace, View, level
+from palpate.window.worker import Frame, Pace, RendererView, level
 
 if TYPE_CHECKING:
     from palpate.window.guide import Guide
@@ -90,7 +90,7 @@ class TouchWindow:
         self._names: tuple[str, ...] = ()
         self.pictures = [self._picture(0, session.renderer_name)]
         self._ghost = GhostTip(self.plotter, session.servo.tip_radius_m) if guide else None
-        self._axes = Axes(self._first)
+        self._axes = AxesGizmo(self._first)
         self.plotter.subplot(0, 2)
         self._charts = LiveCharts(self.plotter, session.trace.seconds)
         points, triangles = self.pictures[0].rest_surface
@@ -153,7 +153,7 @@ class TouchWindow:
         self._second.camera = camera
         return Orbit(camera, middle, up, eye)
 
-    def _follow_views(self, views: tuple[View, ...]) -> None:
+    def _follow_views(self, views: tuple[RendererView, ...]) -> None:
         """As many pictures as there are views, each under its renderer's name."""
         names = tuple(view.name for view in views)
         if names == self._names:

@@ -17,7 +17,7 @@ from palpate.render.registry import create
 from palpate.render.scene import TouchScene
 from palpate.render.surface.felt_surface import with_own_stiffness
 from palpate.window.inclusion import InclusionMover
-from palpate.window.worker import View
+from palpate.window.worker import RendererView
 
 
 class DrawnRenderers:
@@ -86,10 +86,10 @@ class Beside:
         self._force = forces[-1]
         return np.linalg.norm(forces, axis=1)
 
-    def view(self) -> View:
+    def view(self) -> RendererView:
         """Where it stands now."""
         moved = self._scene.renderer.displacement(self._state.touch)
-        return View(self.name, self._force.copy(), moved)
+        return RendererView(self.name, self._force.copy(), moved)
 
     def change(self, renderer: Renderer) -> None:
         """Go on with another renderer of the same kind, for example of another modulus."""

@@ -118,7 +118,7 @@ def level(up: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class View:
+class RendererView:
     """One renderer's side of a frame: force on the tool (3,) N and the surface's displacement (n, 3) m."""
 
     name: str
@@ -141,6 +141,6 @@ class Frame:
     stiffness_n_per_m: float
     force_enabled: bool
     reason: str
-    views: tuple[View, ...]
+    views: tuple[RendererView, ...]
     busy: str
     recorded_s: float | None

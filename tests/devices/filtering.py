@@ -6,7 +6,7 @@ import numpy as np
 
 from palpate.devices.base import DeviceSpec, finite_vector
 from palpate.devices.safety import (
-    Reading,
+    RawPose,
     SafetyOptions,
     reason_words,
     safety_parameters,
@@ -25,7 +25,7 @@ class SafetyFilter:
         self.state = safety_state(workspace_centre_m)
 
     def step(
-        self, wanted_n: np.ndarray, reading: Reading, enable: int, dt_s: float
+        self, wanted_n: np.ndarray, reading: RawPose, enable: int, dt_s: float
     ) -> tuple[np.ndarray, str]:
         """(3,) N that may be sent, and why it differs from what was wanted.
 

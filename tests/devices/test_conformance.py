@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from palpate.devices.base import DeviceSpec, ForceSink, PositionSource, host_clock
-from palpate.devices.safety import Reading, SafetyOptions
+from palpate.devices.safety import RawPose, SafetyOptions
 from palpate.mechanics.errors import DeviceError
 
 from ..support.waiting import PATIENCE_S
@@ -235,7 +235,7 @@ def test_ramp_in_after_enable(forceful: Bench) -> None:
     pushes = []
     state = device.read()
     for tick in range(600):
-        raw = Reading(state.position_m, state.velocity_m_per_s, 0.0, tick, True, True, False)
+        raw = RawPose(state.position_m, state.velocity_m_per_s, 0.0, tick, True, True, False)
         force, _ = safety.step(PUSH, raw, 1, 0.001)
         device.send_force(force)
         pushes.append(force)

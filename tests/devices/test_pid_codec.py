@@ -57,7 +57,7 @@ def test_ids_come_from_the_descriptor() -> None:
     assert other.control(pid.ENABLE_ACTUATORS) == bytes((OTHER_IDS["control"], 1))
     assert other.control(pid.STOP_ALL) == bytes((OTHER_IDS["control"], 3))  # an array counts its usages
     axes = other.axes(struct.pack("<BQ8h", OTHER_IDS["axes"], 5, 32767, *[0] * 7))
-    assert axes == pid.Axes(1.0, None, 5)
+    assert axes == pid.StickReading(1.0, None, 5)
 
 
 def test_positions_and_buttons() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.devices.base import DeviceSpec
-from palpate.devices.safety import Reading, SafetyOptions
+from palpate.devices.safety import RawPose, SafetyOptions
 from palpate.mechanics.errors import OptionError
 
 from .filtering import SafetyFilter
@@ -45,7 +45,7 @@ class Session:
             "calibrated": True,
             "fault": False,
         } | reading
-        force, why = self.filter.step(np.asarray(wanted, float), Reading(**values), self.enable, dt)
+        force, why = self.filter.step(np.asarray(wanted, float), RawPose(**values), self.enable, dt)
         self.forces.append(force)
         return force, why
 
@@ -221,7 +221,7 @@ def test_a_device_without_force_gets_none():
     spec = DeviceSpec(name="mouse", title="mouse")
     unit = SafetyFilter(SafetyOptions(), spec)
     for k in range(600):
-        reading = Reading(np.full(3, 5.0), np.zeros(3), 0.0, k, True, True, False)
+        reading = RawPose(np.full(3, 5.0), np.zeros(3), 0.0, k, True, True, False)
         force, _ = unit.step(PUSH, reading, 1, DT)
         assert (force == 0).all()
 

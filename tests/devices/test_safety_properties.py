@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from palpate.devices.base import DeviceSpec
-from palpate.devices.safety import LATCHING, SILENT, Reading, SafetyOptions, safety_parameters, safety_step
+from palpate.devices.safety import LATCHING, SILENT, RawPose, SafetyOptions, safety_parameters, safety_step
 from palpate.mechanics.errors import DeviceError, OptionError
 
 from .filtering import SafetyFilter
@@ -49,7 +49,7 @@ class Wild:
     def step(self, one: dict) -> None:
         self.sequence += one["fresh"]
         before = self.filter.state.force.copy()
-        reading = Reading(
+        reading = RawPose(
             np.array(one["position"]),
             np.array(one["velocity"]),
             one["age_s"],
@@ -70,7 +70,7 @@ class Wild:
         forces = []
         for _ in range(number):
             self.sequence += 1
-            reading = Reading(np.zeros(3), np.zeros(3), 0.0005, self.sequence, True, True, False)
+            reading = RawPose(np.zeros(3), np.zeros(3), 0.0005, self.sequence, True, True, False)
             forces.append(self.filter.step(PUSH, reading, enable, DT)[0])
         return forces
 
@@ -126,7 +126,7 @@ def test_a_fault_of_the_caller_zeroes_and_ramps_in_again():
     session = Session().ramped()
     unit, reading = session.filter, None
     for k in range(3):
-        reading = Reading(np.zeros(3), np.zeros(3), 0.0005, 1000 + k, True, True, False)
+        reading = RawPose(np.zeros(3), np.zeros(3), 0.0005, 1000 + k, True, True, False)
         reasons = safety_step(unit.parameters, unit.state, PUSH, reading, 1, DT, SILENT)
         assert reasons & SILENT and not reasons & LATCHING and not unit.state.force.any()
     session.sequence = 1002

@@ -11,7 +11,7 @@ import pytest
 from palpate.devices.base import ForceSink, PositionSource
 from palpate.devices.channel import PoseChannel
 from palpate.devices.impedance import HandImpedance
-from palpate.devices.intention import FreeExploration, Path, minimum_jerk
+from palpate.devices.intention import FreeExploration, HandPath, minimum_jerk
 from palpate.devices.mouse import WINDOW_SILENT_S, MouseDevice
 from palpate.devices.registry import DEVICES, DeviceChoice, find_devices, make_device
 from palpate.devices.replay import ReplayDevice, ReplayOptions
@@ -30,9 +30,9 @@ class Clock:
         return self.now
 
 
-def _rest(height_m: float = 0.0) -> Path:
+def _rest(height_m: float = 0.0) -> HandPath:
     """A hand that stays where it is."""
-    return Path(np.zeros(1), np.array([[0.0, 0.0, height_m]]))
+    return HandPath(np.zeros(1), np.array([[0.0, 0.0, height_m]]))
 
 
 def run(hand: SimulatedHand, clock: Clock, seconds: float, force=lambda x: np.zeros(3)) -> list:
@@ -138,19 +138,19 @@ def test_an_exploring_hand_never_hurries(radius_m: float) -> None:
 
 
 def test_path_reaches_its_waypoints_without_a_jerk() -> None:
-    path = Path([0.0, 1.0, 2.0], [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]])
+    path = HandPath([0.0, 1.0, 2.0], [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]])
     assert path.place(1.0, None, None) == pytest.approx([0.1, 0, 0])
     assert path.place(9.0, None, None) == pytest.approx([0.1, 0.1, 0])
     assert minimum_jerk(0.5) == pytest.approx(0.5)
     steps = np.diff([path.place(t, None, None) for t in np.linspace(0, 2, 2001)], axis=0)
     assert np.linalg.norm(steps, axis=1).max() == pytest.approx(1.875 * 0.1 / 1000, rel=1e-3)
     with pytest.raises(DeviceError, match="increase"):
-        Path([0.0, 0.0], np.zeros((2, 3)))
+        HandPath([0.0, 0.0], np.zeros((2, 3)))
 
 
 def test_a_pause_is_not_replayed() -> None:
     clock = Clock()
-    with SimulatedHand(STILL, Path([0.0, 10.0], [[0, 0, 0], [1, 0, 0]], even=True), clock=clock) as hand:
+    with SimulatedHand(STILL, HandPath([0.0, 10.0], [[0, 0, 0], [1, 0, 0]], even=True), clock=clock) as hand:
         clock.now += 0.5
         late = hand.read()
         clock.now += 5.0

@@ -21,7 +21,7 @@ from palpate.diagnosis.other_simulator.forces import (
     sorted_forces,
     spread_out,
 )
-from palpate.diagnosis.other_simulator.parts import Parameter
+from palpate.diagnosis.other_simulator.parts import StatedParameter
 from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
 from palpate.diagnosis.other_simulator.stated import StatedForward, stated_of
@@ -129,13 +129,13 @@ def test_mending_one_flaw_leaves_the_others_in_place(world):
 
 
 def test_a_poisson_ratio_is_advised_as_far_as_a_simulator_takes_it():
-    wrong = Parameter("stated_poisson_ratio", np.zeros((1, 3)), 0.35, 0.49)
+    wrong = StatedParameter("stated_poisson_ratio", np.zeros((1, 3)), 0.35, 0.49)
     assert parameter_words(wrong) == "give it 0.49 for Poisson's ratio (it had 0.35)"
     most = "give it 0.45 for Poisson's ratio, the most that it takes (the recording says 0.49)"
     assert parameter_words(wrong, 0.45) == most
     there = dataclasses.replace(wrong, stated=0.45)
     assert parameter_words(there, 0.45).endswith("0.45 is the most that it takes: this part stays")
-    tip = Parameter("stated_tip_radius", np.zeros((1, 3)), 0.005, 0.006)
+    tip = StatedParameter("stated_tip_radius", np.zeros((1, 3)), 0.005, 0.006)
     assert parameter_words(tip, 0.45) == "give it 0.006 m for the tip's radius (it had 0.005 m)"
 
 

@@ -14,7 +14,7 @@ from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.descent import Descent, fit
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import covariance, parameter_intervals
-from palpate.diagnosis.search.leave_one_out import Candidate, held_out
+from palpate.diagnosis.search.leave_one_out import JudgedSet, held_out
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.site_stiffness import repeat_scatter
 from palpate.diagnosis.verdict.held_out import deepest, held_out_by_refit, neighbours
@@ -69,14 +69,14 @@ def test_what_no_noise_tells_is_added(late):
 def test_what_one_place_alone_speaks_for_closes_nothing(late):
     """The other places would not have added it, so they do not predict it: as a lump under one place."""
     search, plain, _ = late
-    old = Candidate(plain, 0.5 * plain.gram[:, 0, 0], plain.raw[:, 0, 0].copy(), search.dof)
+    old = JudgedSet(plain, 0.5 * plain.gram[:, 0, 0], plain.raw[:, 0, 0].copy(), search.dof)
 
     def better_at(sites) -> Score:
         gram, lower = plain.gram.copy(), old.plain.copy()
         gram[sites, 0, 0] *= 0.2
         lower[sites] *= 0.2
         found = dataclasses.replace(plain, gram=gram)
-        return search.score([DELAY], Candidate(found, 0.5 * gram[:, 0, 0], lower, search.dof), old)
+        return search.score([DELAY], JudgedSet(found, 0.5 * gram[:, 0, 0], lower, search.dof), old)
 
     assert better_at([1]).share == better_at([1]).gain == 0.0
     assert better_at([1, 3, 5]).share > 0.05

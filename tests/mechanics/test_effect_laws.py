@@ -7,16 +7,16 @@ import pytest
 
 from palpate.mechanics.effects.jkr_adhesion import _set as set_adhesion
 from palpate.mechanics.effects.jkr_adhesion import edge_share
-from palpate.mechanics.effects.law import Law
+from palpate.mechanics.effects.law import PathLaw
 from palpate.mechanics.effects.poroelasticity import LAW as POROELASTIC
 from palpate.mechanics.effects.power_law_relaxation import LONGEST_S, SHORTEST_S, prony_terms
-from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.effects.viscoelasticity import LAW as PRONY
 
 NORMAL = np.array([0.0, 0.0, 1.0])
 
 
-def stepped(law: Law, numbers: np.ndarray, depth: np.ndarray, force: np.ndarray, dt: float) -> np.ndarray:
+def stepped(law: PathLaw, numbers: np.ndarray, depth: np.ndarray, force: np.ndarray, dt: float) -> np.ndarray:
     """(n,) N along the normal, from quasi-static forces (n,) at depths (n,) m, dt s apart."""
     memory, out, deepest = np.zeros(law.memory(numbers)), np.empty(len(depth)), 0.0
     for i, (d, f) in enumerate(zip(depth, force, strict=True)):
@@ -94,7 +94,7 @@ def sticky(
     give: float = 0.0,
 ) -> np.ndarray:  # fmt: skip
     """(n,) N on a half-space, in series with a spring that gives `give` m/N."""
-    touch = Touch()
+    touch = TouchTerms()
     keys = {"work_j_per_m2": work, "healed": healed, "range_m": reach or 1e-7 * radius}
     set_adhesion(touch, keys, E_STAR, 0.0, radius)
     ((law, numbers),) = touch.numbers.items()

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from benchmarks._condensation import condense
-from palpate.mechanics.elastic.inclusion import Region
+from palpate.mechanics.elastic.inclusion import StiffenedElements
 from palpate.mechanics.elastic.pardiso import available
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import MeshError
@@ -33,7 +33,7 @@ def test_low_rank_update_equals_full_recompute(box, base):
     plain = condense(mesh, 0.49, before)
     centre = np.array([0.01, 0.0, 0.006 if base else 0.03])
     pool = np.flatnonzero(share_inside(mesh, centre, 0.022) > 0)
-    region = Region(Solver(mesh, 0.49, before), pool, selection(mesh))
+    region = StiffenedElements(Solver(mesh, 0.49, before), pool, selection(mesh))
     for radius in (0.012, 0.018):
         ratio = inclusion_ratio(mesh, centre, radius, 6.0)
         after = condense(mesh, 0.49, before * ratio).matrix
@@ -48,8 +48,8 @@ def test_a_region_that_grew_is_the_region_from_the_start(box):
     rng = np.random.default_rng(1)
     pool = rng.permutation(np.flatnonzero(share_inside(mesh, np.array([0.01, 0.0, 0.01]), 0.025) > 0))
     factor = rng.uniform(0.5, 8.0, len(pool))
-    whole = Region(solver, pool, selection(mesh))
-    grown = Region(solver, pool[:9], selection(mesh))
+    whole = StiffenedElements(solver, pool, selection(mesh))
+    grown = StiffenedElements(solver, pool[:9], selection(mesh))
     grown.extend(pool[4:20])
     grown.extend(pool)
     grown.extend(pool[3:5])
@@ -67,7 +67,7 @@ def test_share_of_a_sphere_adds_up_to_its_volume(box):
 
 def test_a_factor_an_element_is_asked_for(box):
     mesh = box((2, 2, 2), (0.1, 0.1, 0.1))
-    region = Region(Solver(mesh, 0.4), np.array([0, 5]), selection(mesh))
+    region = StiffenedElements(Solver(mesh, 0.4), np.array([0, 5]), selection(mesh))
     with pytest.raises(MeshError, match="2 positive values"):
         region.change(np.array([1.0]))
 

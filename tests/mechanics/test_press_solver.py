@@ -6,9 +6,9 @@ import pytest
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.press_solver import equilibrium as settling
-from palpate.mechanics.press_solver.graded_mesh import FeltSurface, drawn_to, even_surface, graded_mesh
+from palpate.mechanics.press_solver.graded_mesh import CurvedSurface, drawn_to, even_surface, graded_mesh
 from palpate.mechanics.press_solver.press import PressOptions, PressSolver
-from palpate.mechanics.press_solver.solid import Solid
+from palpate.mechanics.press_solver.solid import SolidElements
 from palpate.mechanics.shape.tetmesh import box_mesh
 
 RADIUS_M, HEIGHT_M = 5e-3, 0.3
@@ -36,7 +36,7 @@ def graded_box():
 
 def test_a_uniform_deformation_leaves_inner_nodes_in_balance():
     mesh = graded_box()
-    solid = Solid(mesh.points, mesh.cells, 0.49, 0.3)
+    solid = SolidElements(mesh.points, mesh.cells, 0.49, 0.3)
     stretch = np.array([[0.12, 0.05, -0.03], [0.02, -0.06, 0.04], [0.01, 0.03, -0.04]])
     force = solid.respond(mesh.points @ stretch.T).forces
     total = np.zeros_like(mesh.points)
@@ -51,7 +51,7 @@ def test_a_uniform_deformation_leaves_inner_nodes_in_balance():
 @pytest.mark.parametrize("stiffening, local", [(0.0, 0.0), (0.6, 0.0), (-0.3, 5.0)])
 def test_force_is_the_slope_of_energy_and_tangent_that_of_force(stiffening, local, coupled):
     mesh, rng = graded_box(), np.random.default_rng(0)
-    solid = Solid(mesh.points, mesh.cells, 0.49, stiffening, coupled=coupled, local_bulk=local)
+    solid = SolidElements(mesh.points, mesh.cells, 0.49, stiffening, coupled=coupled, local_bulk=local)
     u = mesh.points @ (0.08 * rng.normal(size=(3, 3))) + 2e-5 * np.sin(300 * mesh.points)
     d = mesh.points @ rng.normal(size=(3, 3)) + 1e-4 * rng.normal(size=u.shape)
     here, step = solid.respond(u, tangent=True), 1e-5
@@ -64,7 +64,7 @@ def test_force_is_the_slope_of_energy_and_tangent_that_of_force(stiffening, loca
 
 def test_a_graded_mesh_fills_the_block_and_is_fine_where_it_is_asked():
     mesh = graded_box()
-    solid = Solid(mesh.points, mesh.cells, 0.3)
+    solid = SolidElements(mesh.points, mesh.cells, 0.3)
     assert solid.weights.sum() == pytest.approx(0.04 * 0.04 * 0.03, rel=1e-12)
     assert solid.weights.min() > 0
     corner = mesh.points[mesh.cells[:, :4]]
@@ -77,7 +77,7 @@ def test_new_nodes_lie_on_the_felt_surface():
     import pyvista
 
     ball = pyvista.Sphere(radius=0.02, theta_resolution=40, phi_resolution=40)
-    surface = FeltSurface(np.asarray(ball.points, dtype=float), ball.regular_faces)
+    surface = CurvedSurface(np.asarray(ball.points, dtype=float), ball.regular_faces)
     points = np.random.default_rng(1).normal(size=(50, 3))
     points *= 0.0198 / np.linalg.norm(points, axis=1, keepdims=True)
     # curved by its normals, it is a tenth as far from the ball as its facets are
@@ -116,7 +116,7 @@ def test_a_coarse_cylinders_felt_surface_is_round_up_to_its_rim():
     turn, z = np.meshgrid(np.linspace(0, 2 * np.pi, 101), half - 1e-3 * np.array([0.5, 1.5, 4, 30]))
     wall = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=-1).reshape(-1, 3)
     cap = wall * [0.97, 0.97, 0] + [0, 0, half]
-    felt = FeltSurface(*even_surface(shell.vertices, shell.faces))
+    felt = CurvedSurface(*even_surface(shell.vertices, shell.faces))
     assert np.linalg.norm(felt.nearest(np.vstack([wall, cap])) - np.vstack([wall, cap]), axis=1).max() < 2e-5
 
 

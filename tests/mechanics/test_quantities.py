@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from palpate.mechanics.disk.schema import Key
+from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model import files as model_files
@@ -49,7 +49,7 @@ def test_what_people_read_is_the_same_quantity():
 
 def _keys(schema, names=()):
     for name, form in schema.items():
-        if isinstance(form, Key):
+        if isinstance(form, FileKey):
             yield name, form.unit
         elif isinstance(form, dict):
             yield from _keys(form, (*names, name))

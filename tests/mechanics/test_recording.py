@@ -13,7 +13,7 @@ import pytest
 from palpate.mechanics.disk.toml_text import dump_toml
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.recording.recording import Recording, read_recording, write_recording
-from palpate.mechanics.recording.segments import Segment
+from palpate.mechanics.recording.segments import TimeSegment
 
 TOML = """[recording]
 sample_rate_hz = 1000.0
@@ -50,7 +50,7 @@ def test_round_trip_keeps_samples_and_description(tmp_path):
 def test_a_recording_with_segments_is_written_over_itself(tmp_path):
     t = np.arange(50) / 1000
     wave = np.column_stack([np.sin(t), np.cos(t), t])
-    parts = (Segment("trace", 0.0, 0.02), Segment("rigid", 0.02, 0.04))
+    parts = (TimeSegment("trace", 0.0, 0.02), TimeSegment("rigid", 0.02, 0.04))
     recording = Recording(t, wave, -wave, 1000.0, 0.004, segments=parts)
     for _ in range(2):
         write_recording(tmp_path / "rec.csv", recording)

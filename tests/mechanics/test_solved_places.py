@@ -9,7 +9,12 @@ from palpate.mechanics.contact.depth_factors import CONVERGENCE, DepthFactors
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.press_solver import solved_places
-from palpate.mechanics.press_solver.solved_places import Touched, felt_of, said_beforehand, solve_touched
+from palpate.mechanics.press_solver.solved_places import (
+    PlacesToSolve,
+    felt_of,
+    said_beforehand,
+    solve_touched,
+)
 from palpate.mechanics.shape.tetmesh import box_mesh
 
 E, NU, TIP = 20e3, 0.49, 0.005
@@ -38,7 +43,7 @@ def solved_block(monkeypatch, normal_force, laws=("linear", "neo-hookean")):
     mesh = box_mesh((4, 4, 2), (0.08, 0.08, 0.04)).quadratic()
     points = np.array([[-0.01, 0, 0.04], [0.01, 0, 0.04], [-0.01, 0, 0.04], [0.01, 0, 0.04]])
     known = TouchedPlaces(np.tile(UP, (4, 1)), np.zeros((4, 3, 3)))
-    touched = Touched(points, np.array([0, 1, 0, 1]), np.array([2e-3, 4e-3, 3e-3, 1e-3]), known)
+    touched = PlacesToSolve(points, np.array([0, 1, 0, 1]), np.array([2e-3, 4e-3, 3e-3, 1e-3]), known)
     exact = solve_touched(
         mesh, touched, laws, ratio=np.ones(len(mesh.tetrahedra)), poisson_ratio=NU, young_modulus_pa=E,
         tip_radius_m=TIP,
@@ -132,7 +137,7 @@ def test_a_solved_place_of_a_block_lies_beside_the_law(tmp_path, monkeypatch):
     far = own_blocks(Solver(fine, NU), points, WIDTH) - half_space_compliance(normals, NU, WIDTH)
     known = TouchedPlaces(normals, far)
     exact = solve_touched(
-        mesh.quadratic(), Touched(points, np.array([0]), np.array([4e-3]), known), ("linear",),
+        mesh.quadratic(), PlacesToSolve(points, np.array([0]), np.array([4e-3]), known), ("linear",),
         ratio=np.ones(len(mesh.tetrahedra)), poisson_ratio=NU, young_modulus_pa=E, tip_radius_m=TIP,
     )  # fmt: skip
     np.testing.assert_allclose(exact.places[0].solved_n, exact.places[0].law_n, rtol=0.01)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.errors import PalpateError, RecordingError
-from palpate.reconstruction.checks.finding import Finding, Outcome, decades_of_tail, outcome
-from palpate.reconstruction.checks.registry import Checkup, check, checked_samples, widened
+from palpate.reconstruction.checks.finding import Finding, ReconstructionOutcome, decades_of_tail, outcome
+from palpate.reconstruction.checks.registry import CheckupRun, check, checked_samples, widened
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.units import measured
 
@@ -88,11 +88,11 @@ def test_the_delay_of_the_force_is_read_off_places_passed_twice(cylinder):
 def test_grave_findings_refuse_unless_forced(cylinder):
     flipped = dataclasses.replace(cylinder[0], force_on_tool=-cylinder[0].force_on_tool)
     with pytest.raises(RecordingError, match="force sign: .*force_on.*--force"):
-        Checkup(flipped)
-    (finding, *_) = Checkup(flipped, force=True).found
+        CheckupRun(flipped)
+    (finding, *_) = CheckupRun(flipped, force=True).found
     assert finding.name == "force sign" and "--force-on object" in finding.todo
     stated = dataclasses.replace(flipped, description={"recording": {"force_on": "object"}})
-    assert "--force-on tool" in Checkup(stated, force=True).found[0].todo
+    assert "--force-on tool" in CheckupRun(stated, force=True).found[0].todo
 
 
 def test_lesser_findings_widen_the_interval():
@@ -117,9 +117,9 @@ def test_lesser_findings_widen_the_interval():
 )
 def test_an_outcome_that_is_none_is_an_error(modulus, interval, misfit, name):
     ones = np.ones(5)
-    found = list(outcome(Outcome(modulus, interval, misfit * ones, ones, ones)))
+    found = list(outcome(ReconstructionOutcome(modulus, interval, misfit * ones, ones, ones)))
     assert [f.name for f in found] == [name] and found[0].grave
-    assert not list(outcome(Outcome(30e3, (29e3, 31e3), 0.02 * ones, ones, ones)))
+    assert not list(outcome(ReconstructionOutcome(30e3, (29e3, 31e3), 0.02 * ones, ones, ones)))
 
 
 def test_the_probability_of_a_tail_is_the_binomial_one():

@@ -8,7 +8,7 @@ import pytest
 
 from palpate.mechanics.errors import ContactError, OptionError
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.recording.segments import Segment
+from palpate.mechanics.recording.segments import TimeSegment
 from palpate.reconstruction.steps.s1_filter.noise import low_pass
 from palpate.reconstruction.steps.s1_filter.tool_weight import tool_weight
 from palpate.reconstruction.steps.s3_contacts import single_press
@@ -180,7 +180,7 @@ def test_a_press_on_the_support_is_rejected_and_named():
 def test_presses_that_are_stated_to_be_on_the_support_are_none_of_the_object(cylinder):
     recording, _ = cylinder
     plain = explore(recording).presses
-    stretch = Segment("rigid", plain.onset_s[3] - 0.1, plain.end_s[3] + 0.1)
+    stretch = TimeSegment("rigid", plain.onset_s[3] - 0.1, plain.end_s[3] + 0.1)
     found = explore(dataclasses.replace(recording, segments=(stretch,)))
     np.testing.assert_allclose(found.presses.onset_s, np.delete(plain.onset_s, 3), atol=0.01)
     assert any("stated to be rigid" in reason for _, reason in found.rejected)

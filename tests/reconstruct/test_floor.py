@@ -12,7 +12,7 @@ from palpate.mechanics.model.one_d_laws import RIVALS
 from palpate.reconstruction.geometry.stated import GeometryOptions
 from palpate.reconstruction.methods import ReconstructOptions
 from palpate.reconstruction.pipeline import reconstruct_fully
-from palpate.reconstruction.steps.s7_modulus.held_out import HeldOut, held_out, modulus_by_others
+from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors, held_out, modulus_by_others
 from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions
 
 from .flat_contact import points
@@ -34,7 +34,7 @@ def varied(factorised_once):
     return reconstruct_fully(firmer_along_x(3.0), WHERE_BEATEN)
 
 
-def of_one_modulus(made) -> HeldOut:
+def of_one_modulus(made) -> HeldOutErrors:
     told = held_out(made.model.presses, made.sites, made.modulus, modulus_by_others(made.modulus))
     assert told is not None
     return told

@@ -17,7 +17,7 @@ from palpate.operations._shared import given_model
 from palpate.reconstruction.geometry.known_shape import place
 from palpate.reconstruction.geometry.slab import flat_mesh
 from palpate.reconstruction.geometry.stated import GeometryOptions, nowhere, stated_geometry
-from palpate.reconstruction.shapes.fit import Evidence, Seen
+from palpate.reconstruction.shapes.fit import Evidence, ShapeEvidence
 from palpate.reconstruction.shapes.implicit import implicit_held_out
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.left_out import without_slides
@@ -80,7 +80,7 @@ def test_touches_at_one_place_leave_nothing_out_and_crash_nothing():
         tip_radius_m=TIP_M,
         site=np.zeros(4, dtype=int),
     )
-    assert implicit_held_out(evidence, Seen.of(evidence)) == np.inf
+    assert implicit_held_out(evidence, ShapeEvidence.of(evidence)) == np.inf
 
 
 def test_one_line_for_units_open_meshes_unregistered_shapes_and_points(tmp_path, ground, capsys):

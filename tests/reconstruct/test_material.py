@@ -11,7 +11,7 @@ import palpate as pp
 from palpate import cli
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.specimen.approach import approach_of
-from palpate.diagnosis.specimen.bench import Curve, Similarity, bench_of
+from palpate.diagnosis.specimen.bench import MachineCycle, Similarity, bench_of
 from palpate.diagnosis.specimen.bench_diagnosis import held_out_rivals
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import ContactError, OptionError, RecordingError
@@ -64,7 +64,7 @@ def test_a_law_that_softens_is_told_from_one_curve():
     )
 
 
-def indentations(count: int, radius: float, modulus: float, seed: int = 0) -> list[Curve]:
+def indentations(count: int, radius: float, modulus: float, seed: int = 0) -> list[MachineCycle]:
     """Approach and retract of a sphere on a deep sample, at any scale."""
     rng, curves = np.random.default_rng(seed), []
     for k in range(count):
@@ -72,7 +72,7 @@ def indentations(count: int, radius: float, modulus: float, seed: int = 0) -> li
         deep = radius * (rng.uniform(0.25, 0.4) * np.sin(np.pi * t / 4) - 0.05)
         force = np.asarray(dent_law("sphere").force(np.maximum(deep, 0), modulus, 0.49, radius))
         noise = 0.003 * force.max() * rng.standard_normal(len(t))
-        curves.append(Curve(t, deep + 3e-5 * k, force + noise + 0.2 * force.max(), f"curve {k}"))
+        curves.append(MachineCycle(t, deep + 3e-5 * k, force + noise + 0.2 * force.max(), f"curve {k}"))
     return curves
 
 

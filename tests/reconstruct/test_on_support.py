@@ -9,7 +9,7 @@ import pytest
 
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.recording.segments import Segment
+from palpate.mechanics.recording.segments import TimeSegment
 from palpate.reconstruction.checks.support import support
 from palpate.reconstruction.geometry.stated import nowhere
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
@@ -90,7 +90,7 @@ def test_presses_on_the_bare_support_are_recognised_as_rigid(cylinder):
     found = explore(again)
     assert len(found.presses) == len(plain.presses)
     assert [s.kind for s in found.presses.segments].count("rigid") == 3
-    stated = Segment("rigid", float(recording.t[-1]), float(again.t[-1]))
+    stated = TimeSegment("rigid", float(recording.t[-1]), float(again.t[-1]))
     told = explore(dataclasses.replace(again, segments=(stated,))).presses.segments
     assert [s for s in told if s.kind == "rigid"] == [stated]
 

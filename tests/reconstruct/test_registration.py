@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from palpate.mechanics.compliance.sites import touch_sites, touch_solver
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.shape.tetmesh import box_mesh, vertex_normals
-from palpate.reconstruction.geometry.registration import Body, Registration, Touched, register
+from palpate.reconstruction.geometry.registration import Registration, ShapeToPlace, TouchedPoints, register
 from palpate.reconstruction.steps.s3_contacts.left_out import sliding
 from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError, compliance_covariance
 
@@ -30,7 +30,7 @@ def wedge() -> tuple[np.ndarray, np.ndarray]:
 
 def touched(
     shape: tuple[np.ndarray, np.ndarray], *, seed: int, facing_up: float = -0.2, slips: int = 2
-) -> tuple[Touched, Rotation, np.ndarray]:
+) -> tuple[TouchedPoints, Rotation, np.ndarray]:
     """First touches of a body in a random pose: 0.2 mm of noise, slips of 4 mm, directions 9 degrees off."""
     rng = np.random.default_rng(seed)
     points, face = trimesh.sample.sample_surface(trimesh.Trimesh(*shape), 2000, seed=seed)
@@ -47,7 +47,7 @@ def touched(
     told = out + 0.15 * rng.standard_normal(out.shape)
     told /= np.linalg.norm(told, axis=1, keepdims=True)
     error = np.full(len(chosen), 1e-4)
-    return Touched(at, told, error, np.arange(len(chosen)), TIP_M), turn, shift
+    return TouchedPoints(at, told, error, np.arange(len(chosen)), TIP_M), turn, shift
 
 
 def surface_error(found: Registration, shape, turn: Rotation, shift: np.ndarray) -> np.ndarray:
@@ -62,7 +62,7 @@ def surface_error(found: Registration, shape, turn: Rotation, shift: np.ndarray)
 def test_a_shape_is_found_in_any_pose_despite_slips(seed):
     shape = wedge()
     told, turn, shift = touched(shape, seed=seed)
-    found = register(Body(*shape, np.zeros(3), np.array([0, 0, 1.0])), told)
+    found = register(ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0])), told)
     assert surface_error(found, shape, turn, shift).max() < 0.8e-3
     assert found.weight[:2].max() < 0.01 and found.rms_m < 4e-4
     corners = found.to_device(shape[0])
@@ -76,7 +76,7 @@ def test_what_the_touches_leave_open_is_told():
     block.apply_translation([0, 0, 0.02])
     shape = np.array(block.vertices), np.array(block.faces)
     told, *_ = touched(shape, seed=3, facing_up=0.9)
-    found = register(Body(*shape, np.zeros(3), np.array([0, 0, 1.0])), told)
+    found = register(ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0])), told)
     up = told.normals.mean(axis=0) / np.linalg.norm(told.normals.mean(axis=0))
     spot = told.centres.mean(axis=0) - TIP_M * up
     aside = np.cross(up, [1.0, 0.3, 0.2])
@@ -90,7 +90,7 @@ def test_as_it_stands_only_the_residuals_are_told():
     told, turn, shift = touched(shape, seed=4, slips=0)
     home = dataclasses.replace(told, centres=turn.inv().apply(told.centres - shift) + [0, 0, 0.0015])
     home = dataclasses.replace(home, normals=turn.inv().apply(told.normals))
-    found = register(Body(*shape, np.zeros(3), np.array([0, 0, 1.0])), home, free=False)
+    found = register(ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0])), home, free=False)
     assert np.array_equal(found.rotation, np.eye(3)) and not found.covariance.any()
     on_top = home.normals[:, 2] > 0.8
     assert np.median(found.residual_m[on_top]) == pytest.approx(0.0015, abs=3e-4)

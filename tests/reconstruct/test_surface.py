@@ -216,7 +216,7 @@ def test_the_labelled_recordings_meet_the_targets(shared_recordings, stem, name)
 
 def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
     from palpate.reconstruction.shapes.choice import first_guesses
-    from palpate.reconstruction.shapes.fit import Seen, fit
+    from palpate.reconstruction.shapes.fit import ShapeEvidence, fit
 
     evidence, _ = touch(phantom_truth("cylinder"), 2)
     up = evidence.support_normal
@@ -232,7 +232,7 @@ def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
         normals=evidence.normals[kept],
         centre_error_m=evidence.centre_error_m[kept],
     )
-    seen = Seen.of(few)
+    seen = ShapeEvidence.of(few)
     sloped = [g for g in first_guesses(few, seen) if any(p.label == "slope_x" for p in g.parameters)][0]
     found, _ = fit(sloped, seen)
     slopes = [p.value for p in found.parameters if p.label.startswith("slope")]

@@ -7,7 +7,7 @@ import pytest
 
 from palpate import render
 from palpate.mechanics.errors import ModelError, OptionError
-from palpate.mechanics.model.one_d_laws import Law, spread_law
+from palpate.mechanics.model.one_d_laws import OneDLaws, spread_law
 from palpate.mechanics.presses.making import no_presses
 
 TIP = 0.005
@@ -65,7 +65,7 @@ def test_a_1d_model_without_parameters_says_so(one_d_model):
 
 def test_spreading_averages_repeats_and_stays_in_range():
     points = np.array([[0.0, 0, 0], [0.0005, 0, 0], [0.05, 0, 0], [0.1, 0, 0]])
-    law = Law(np.array([100.0, 300.0, 400.0, np.nan]), np.zeros(4), np.ones(4), np.zeros(4))
+    law = OneDLaws(np.array([100.0, 300.0, 400.0, np.nan]), np.zeros(4), np.ones(4), np.zeros(4))
     at = spread_law(
         points, np.array([0, 0, 1, 2]), law, np.array([[0.00025, 0, 0], [0.05, 0, 0], [1.0, 0, 0]])
     )

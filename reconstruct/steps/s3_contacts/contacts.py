@@ -34,7 +34,7 @@ from palpate.reconstruction.steps.s3_contacts.first_touch import (
     find_first_touches,
 )
 from palpate.reconstruction.steps.s3_contacts.force_delay import Delay, force_delay
-from palpate.reconstruction.steps.s3_contacts.single_press import Touch
+from palpate.reconstruction.steps.s3_contacts.single_press import FoundPress
 
 METHODS = ("noise", "paper")
 _DELAY_ROUNDS = 4
@@ -256,7 +256,7 @@ def _tabled(
     )
 
 
-def _speed(signals: Signals, contact: Touch) -> float:
+def _speed(signals: Signals, contact: FoundPress) -> float:
     """m/s, of the approach where it touches."""
     rate = signals.recording.sample_rate_hz
     half = round(0.015 * rate)

@@ -15,7 +15,7 @@ from scipy.signal import find_peaks
 
 from palpate.reconstruction.steps.s1_filter.signals import Signals
 from palpate.reconstruction.steps.s3_contacts.contact_law import Loading, first_touches
-from palpate.reconstruction.steps.s3_contacts.single_press import Touch, initial_normal
+from palpate.reconstruction.steps.s3_contacts.single_press import FoundPress, initial_normal
 
 _STEP_RADII = 1 / 8
 """Of the tip: a way straight in or out so long without a change of the force is free air."""
@@ -176,7 +176,9 @@ def _goes_in(signals: Signals, piece: Piece, way: int) -> int:
     return piece.start if way < 0 else piece.end
 
 
-def found_cycles(signals: Signals, pieces: Sequence[Piece]) -> tuple[list[Touch], list[tuple[int, int, str]]]:
+def found_cycles(
+    signals: Signals, pieces: Sequence[Piece]
+) -> tuple[list[FoundPress], list[tuple[int, int, str]]]:
     """The cycles of one recording as presses, and the pieces that are none: (start, end, reason)."""
     kept, loadings, unused = [], [], []
     up = _plane_of_peaks(signals, pieces)
@@ -204,5 +206,5 @@ def found_cycles(signals: Signals, pieces: Sequence[Piece]) -> tuple[list[Touch]
         peak = signals.position[piece.peak]
         deep = -(peak - each.origin) @ each.normal - at
         centre = peak + deep * each.normal
-        found.append(Touch(piece.start, piece.peak, piece.end, centre, each.normal, float(sd), True))
+        found.append(FoundPress(piece.start, piece.peak, piece.end, centre, each.normal, float(sd), True))
     return found, unused

@@ -14,13 +14,13 @@ import numpy as np
 
 from palpate.mechanics.errors import ContactError, LoudAirError
 from palpate.mechanics.recording.recording import Recording
-from palpate.mechanics.recording.segments import ON_SUPPORT, Segment, runs
+from palpate.mechanics.recording.segments import ON_SUPPORT, TimeSegment, runs
 from palpate.reconstruction.steps.s1_filter.signals import Filtered, Signals, stated_tracing
 from palpate.reconstruction.steps.s2_base import Boundary, BoundaryOptions, find_boundary, find_interval
 from palpate.reconstruction.steps.s3_contacts.cycles import Piece, cycles, found_cycles
 from palpate.reconstruction.steps.s3_contacts.force_delay import Delay, delay_by_places
 from palpate.reconstruction.steps.s3_contacts.on_support import on_it, recognised, stated
-from palpate.reconstruction.steps.s3_contacts.single_press import Touch, fitted_touch, paper_touch
+from palpate.reconstruction.steps.s3_contacts.single_press import FoundPress, fitted_touch, paper_touch
 
 PAPER_THRESHOLD_N = 1.0
 _CLEAR = 1.5
@@ -147,11 +147,11 @@ class FirstTouches:
 
     spans: ContactSpans
     boundary: Boundary
-    touches: tuple[Touch, ...]
+    touches: tuple[FoundPress, ...]
     unused: tuple[tuple[int, int, str], ...]
     threshold_n: float
     cut: tuple[tuple[int, int], ...]
-    supported: tuple[Segment, ...]
+    supported: tuple[TimeSegment, ...]
 
 
 def find_first_touches(spans: ContactSpans, request: TouchRequest) -> FirstTouches:
@@ -175,7 +175,7 @@ def find_first_touches(spans: ContactSpans, request: TouchRequest) -> FirstTouch
     contacts = runs(touching)
     said = any(s.kind in ON_SUPPORT for s in recording.segments)
     known = {} if said or request.base else recognised(signals, boundary, contacts)
-    touches: list[Touch] = []
+    touches: list[FoundPress] = []
     unused: list[tuple[int, int, str]] = []
     pieces: list[Piece] = []
     cut: list[tuple[int, int]] = []
@@ -204,7 +204,7 @@ def find_first_touches(spans: ContactSpans, request: TouchRequest) -> FirstTouch
         raise _too_few(recording, request, threshold, (len(touches), len(contacts)), unused, bool(below))
     _check_loudness(signals, touches, request, threshold)
     t = recording.t
-    supported = tuple(Segment(kind, float(t[a]), float(t[b - 1])) for (a, b), kind in known.items())
+    supported = tuple(TimeSegment(kind, float(t[a]), float(t[b - 1])) for (a, b), kind in known.items())
     return FirstTouches(spans, boundary, tuple(touches), tuple(unused), threshold, tuple(cut), supported)
 
 
@@ -258,7 +258,7 @@ def _too_few(
 
 
 def _check_loudness(
-    signals: Signals, touches: list[Touch], request: TouchRequest, threshold_n: float
+    signals: Signals, touches: list[FoundPress], request: TouchRequest, threshold_n: float
 ) -> None:
     """Raises LoudAirError where a threshold by the noise is nearly as high as the presses."""
     if request.method != "noise" or request.threshold_n is not None or not touches:

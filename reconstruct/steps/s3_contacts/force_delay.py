@@ -17,7 +17,7 @@ import numpy as np
 from palpate.mechanics.statistics import biweight, spread_about_zero
 from palpate.reconstruction.steps.s1_filter.signals import Signals
 from palpate.reconstruction.steps.s3_contacts.contact_law import fit_rise
-from palpate.reconstruction.steps.s3_contacts.single_press import Touch
+from palpate.reconstruction.steps.s3_contacts.single_press import FoundPress
 
 _TAIL_S = 0.15
 _AWAY_M = 0.004
@@ -72,7 +72,7 @@ def delay_by_places(
     return Delay(middle, 1.25 * scatter / float(np.sqrt(len(lags))), len(lags))
 
 
-def force_delay(signals: Signals, contacts: Sequence[Touch]) -> Delay:
+def force_delay(signals: Signals, contacts: Sequence[FoundPress]) -> Delay:
     """How late the force reads; zero with an infinite error where fewer than 8 presses can tell.
 
     Presses that end over 1 mm beside their first touch are left out: a dragged surface lets go elsewhere.
@@ -95,7 +95,7 @@ def force_delay(signals: Signals, contacts: Sequence[Touch]) -> Delay:
     return Delay(float(fit.fitted[1]), float(fit.scale * np.sqrt(variance)), len(rows))
 
 
-def _gap_and_speed(signals: Signals, contact: Touch) -> tuple[float, float, float] | None:
+def _gap_and_speed(signals: Signals, contact: FoundPress) -> tuple[float, float, float] | None:
     """Depth of first touch less that of loss of touch, its error (m), and both speeds' sum (m/s)."""
     rate, normal = signals.recording.sample_rate_hz, contact.normal
     until = min(len(signals.position), contact.end + int(_TAIL_S * rate))

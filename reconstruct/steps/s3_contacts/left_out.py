@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.recording.segments import Segment
+from palpate.mechanics.recording.segments import TimeSegment
 from palpate.mechanics.statistics import spread_about_zero
 from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contact_law import contact_law, fit_offset, fit_rise
@@ -156,7 +156,7 @@ def _without(exploration: Exploration, reasons: list[str], kind: str | None) -> 
         if s.kind != "press" or s.start_s not in starts:
             segments.append(s)
         elif kind is not None:
-            segments.append(Segment(kind, s.start_s, s.end_s))
+            segments.append(TimeSegment(kind, s.start_s, s.end_s))
     kept = dataclasses.replace(presses.of(~out), segments=tuple(segments))
     refused = [(float(t), r) for t, r in zip(presses.onset_s, reasons, strict=True) if r]
     return dataclasses.replace(

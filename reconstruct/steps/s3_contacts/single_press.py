@@ -16,7 +16,7 @@ _TELLS = 0.7
 free motion it explains less (half of a bump on an even way)."""
 
 
-class Touch(NamedTuple):
+class FoundPress(NamedTuple):
     """One press where it was found; device frame, SI.
 
     start, peak, end: samples of first touch, greatest force, loss of the last force above the noise (end
@@ -33,7 +33,7 @@ class Touch(NamedTuple):
     unbroken: bool = False
 
 
-def paper_touch(signals: Signals, a: int, b: int) -> Touch | None:
+def paper_touch(signals: Signals, a: int, b: int) -> FoundPress | None:
     """First touch where the force started to rise: back from the threshold while each sample is above
     the last.
 
@@ -45,10 +45,10 @@ def paper_touch(signals: Signals, a: int, b: int) -> Touch | None:
     while start > 0 and magnitude[start - 1] < magnitude[start]:
         start -= 1
     peak = a + int(np.argmax(magnitude[a:b]))
-    return Touch(start, peak, b, signals.position[start], signals.force[peak] / magnitude[peak])
+    return FoundPress(start, peak, b, signals.position[start], signals.force[peak] / magnitude[peak])
 
 
-def fitted_touch(signals: Signals, a: int, b: int) -> Touch | None:
+def fitted_touch(signals: Signals, a: int, b: int) -> FoundPress | None:
     """First touch by fitting the contact law to the approach and rise; None where the force has no direction.
 
     a, b: samples between which the force is above its lower threshold.
@@ -82,7 +82,7 @@ def fitted_touch(signals: Signals, a: int, b: int) -> Touch | None:
     law = contact_law(depth, rise.hertz, rise.compliance)
     if _explained(signals.force[first:b] @ normal, law) < _TELLS or depth.max() < rise.u0_error_m:
         return None
-    return Touch(start, peak, b, centre, normal, rise.u0_error_m)
+    return FoundPress(start, peak, b, centre, normal, rise.u0_error_m)
 
 
 def _explained(push: np.ndarray, law: np.ndarray) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.errors import ModelError
-from palpate.mechanics.model.one_d_laws import LAWS, RIVALS, Fits, Law, forces_of, spread_law
+from palpate.mechanics.model.one_d_laws import LAWS, RIVALS, Fits, OneDLaws, forces_of, spread_law
 from palpate.mechanics.presses.table import Presses
 from palpate.reconstruction.steps.s6_one_d import columns, fit_robust, low_passed
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, combine
@@ -22,7 +22,7 @@ BETTER = 0.95
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutErrors:
     """N, rms of the 3-vector over contact samples of presses whose place was held out.
 
     model_n: of the model, its modulus, or field of it, told by the other places. constant_n: of their mean
@@ -67,7 +67,7 @@ def modulus_by_others(fit: ModulusFit) -> np.ndarray | None:
 
 def held_out(
     presses: Presses, sites: TouchSites, fit: ModulusFit, by_others_pa: np.ndarray | None
-) -> HeldOut | None:
+) -> HeldOutErrors | None:
     """Presses that touch at `sites` (one a press, in order), each place predicted by all the others; None
     where there is one place alone or nothing to predict. First touches that were not recorded are where the
     fit has them, for every model alike.
@@ -88,11 +88,11 @@ def held_out(
     floors = {name: square for name in RIVALS if (square := _of_one_d(name, fits, data)) is not None}
     constant = _rms(_squares(_constant(data), data))
     if not floors:
-        return HeldOut(_rms(missed), constant)
+        return HeldOutErrors(_rms(missed), constant)
     floor = min(floors, key=lambda name: floors[name].mean())
     worse = np.bincount(data.site[data.press], weights=missed - floors[floor])
     error = float(np.sqrt(len(worse)) * worse.std(ddof=1))
-    return HeldOut(
+    return HeldOutErrors(
         _rms(missed), constant, floor, _rms(floors[floor]), float(worse.sum()) / max(error, 1e-300)
     )
 
@@ -112,11 +112,11 @@ def _of_one_d(name: str, fits: Fits, data: Presses) -> np.ndarray | None:
     try:
         for place in np.unique(data.site):
             seen, here = data.site != place, data.site == place
-            law = Law(*(column[seen] for column in own))
+            law = OneDLaws(*(column[seen] for column in own))
             spread[:, here] = spread_law(data.point[seen], data.site[seen], law, data.point[here])
     except ModelError:
         return None
-    return _squares(forces_of(Law(*spread), data), data)
+    return _squares(forces_of(OneDLaws(*spread), data), data)
 
 
 def _squares(force: np.ndarray, data: Presses) -> np.ndarray:

@@ -18,7 +18,7 @@ from palpate.mechanics.compliance.field_response import far_in_field, shares_of,
 from palpate.mechanics.compliance.pressed_places import Places, places_at
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.compliance.smooth_field import (
-    Estimate,
+    FieldEstimate,
     Shares,
     SmoothField,
     Views,
@@ -108,7 +108,7 @@ def press_moduli(
     return PressModuli(fit, answer, shares_of(places, answer), presses.site, places, data, sites, noise_n)
 
 
-def fit_field(own: PressModuli, seen: np.ndarray) -> Estimate | None:
+def fit_field(own: PressModuli, seen: np.ndarray) -> FieldEstimate | None:
     """The likeliest field of the presses `seen` (numbers); None where too few places tell.
 
     Shares of the compliance are first order in the field: where it is asked for, the presses are fitted anew
@@ -122,7 +122,7 @@ def fit_field(own: PressModuli, seen: np.ndarray) -> Estimate | None:
     return found
 
 
-def _likeliest(own: PressModuli, fit: LawFit, seen: np.ndarray) -> Estimate | None:
+def _likeliest(own: PressModuli, fit: LawFit, seen: np.ndarray) -> FieldEstimate | None:
     seen = seen[fit.telling[seen]]
     if len(np.unique(own.site[seen])) < LEAST_SITES:
         return None
@@ -131,7 +131,7 @@ def _likeliest(own: PressModuli, fit: LawFit, seen: np.ndarray) -> Estimate | No
     )
 
 
-def asked_for(found: Estimate | None) -> bool:
+def asked_for(found: FieldEstimate | None) -> bool:
     """Whether the evidence asks for a field."""
     return (
         found is not None
@@ -141,7 +141,7 @@ def asked_for(found: Estimate | None) -> bool:
     )
 
 
-def map_sd(found: Estimate, tip_radius_m: float) -> np.ndarray:
+def map_sd(found: FieldEstimate, tip_radius_m: float) -> np.ndarray:
     """(c,) standard deviation of ln E at a field's places: the estimate's, the level's that no press tells,
     and that of the depth at which a dent feels."""
     apart = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, DENT_DEPTH_SD * tip_radius_m]])
@@ -200,7 +200,7 @@ class FieldOptions:
     )
 
 
-def modulus_by_field(own: PressModuli, found: Estimate) -> np.ndarray:
+def modulus_by_field(own: PressModuli, found: FieldEstimate) -> np.ndarray:
     """(p,) Pa, each press's modulus, as if the object were of one, as the presses of other sites tell it."""
     log_modulus = found.level + own.shares.weight @ found.field.at(own.shares.nodes)
     number = np.clip(np.searchsorted(found.site, own.site), 0, len(found.site) - 1)

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.devices.codecs import spacemouse
 from palpate.exporting.page.tables import (
-    Block,
+    PackedArrays,
     depths_of,
     greatest_depth,
     modes_of,
@@ -41,11 +41,11 @@ UNKNOWN_SHARE = 0.1
 """Of the modulus, where a model states no interval."""
 
 
-def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Block, dict[str, Any]]:
+def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[PackedArrays, dict[str, Any]]:
     """The arrays of a page, and what its scripts are told of the model."""
     model, arrays = renderer.model, renderer.contact.arrays
     depths = depths_of(greatest_depth(renderer))
-    block = Block()
+    block = PackedArrays()
     block.between("vertices", arrays.vertices)
     block.around("normals", arrays.normals)
     block.whole("triangles", arrays.triangles)
@@ -144,7 +144,7 @@ def spacemouse_reports() -> list[dict[str, Any]]:
     return found
 
 
-def _far(block: Block, renderer: FemRenderer) -> None:
+def _far(block: PackedArrays, renderer: FemRenderer) -> None:
     """Modes by which a force moves the mesh's corners, U U^T / E, and how each vertex hangs on three of
     them."""
     compliance, contact = renderer.compliance, renderer.contact
@@ -173,7 +173,7 @@ def shown_modes(compliance: SurfaceCompliance) -> np.ndarray:
     return (vectors[:, :count] * np.sqrt(values[:count])).reshape(t, 3, count)
 
 
-def _measured(block: Block, presses: Presses) -> dict[str, Any]:
+def _measured(block: PackedArrays, presses: Presses) -> dict[str, Any]:
     """The measured presses: where they met the surface and, where samples are kept, force along the normal
     over depth, on the way in and out."""
     block.floats("press_points", presses.point)

@@ -51,7 +51,7 @@ def modes_of(table: np.ndarray, size: np.ndarray, error: float, most: int = MOST
     return Modes(weights, basis.T * size)
 
 
-class Block:
+class PackedArrays:
     """Arrays one after another in one compressed block; `index` says where each is and how it is scaled."""
 
     def __init__(self) -> None:

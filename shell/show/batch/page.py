@@ -13,7 +13,7 @@ from urllib.parse import quote
 import numpy as np
 
 from palpate.batching.plan import THUMBNAIL
-from palpate.batching.summary import Batch, Entry
+from palpate.batching.summary import Batch, BatchEntry
 from palpate.diagnosis.compare.models import RIVALS
 from palpate.show.page import Page, new_figure
 
@@ -143,7 +143,7 @@ def _recordings(result: Batch) -> str:
     return _table([*heads, "CPU [s]"], rows, "recordings")
 
 
-def _row(result: Batch, entry: Entry) -> list[Cell]:
+def _row(result: Batch, entry: BatchEntry) -> list[Cell]:
     row, values = entry.row, entry.values
     cells = [
         _thumbnail(result, row.recording),
@@ -167,7 +167,7 @@ def _row(result: Batch, entry: Entry) -> list[Cell]:
     return [*cells, _number(cpu or None, 1, 0)]
 
 
-def _verdict(result: Batch, entry: Entry) -> Cell:
+def _verdict(result: Batch, entry: BatchEntry) -> Cell:
     """What was found, or why it was not."""
     row = entry.row
     said = verdict_words(entry) or row.status
@@ -180,7 +180,7 @@ def _verdict(result: Batch, entry: Entry) -> Cell:
     return Cell(text, said, "words")
 
 
-def _modulus(entry: Entry) -> Cell:
+def _modulus(entry: BatchEntry) -> Cell:
     e, low, high = (getattr(entry.row, f"young_modulus_{end}pa") for end in ("", "lo_", "hi_"))
     if e is None:
         return Cell()
@@ -189,7 +189,7 @@ def _modulus(entry: Entry) -> Cell:
     return Cell(f"<span>{e / 1e3:.2f}{interval}</span>", e)
 
 
-def verdict_words(entry: Entry) -> str:
+def verdict_words(entry: BatchEntry) -> str:
     """'viscoelasticity', 'force bias or force drift', 'none', ...; '' where nothing was diagnosed."""
     found = entry.values.get("diagnose")
     if found is None:

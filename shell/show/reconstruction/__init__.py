@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.reconstruction.methods import Solved
+from palpate.reconstruction.methods import SolvedPresses
 from palpate.reconstruction.pipeline import Reconstruction
-from palpate.reconstruction.steps.s7_modulus.held_out import HeldOut
+from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors
 from palpate.show import model as made
 from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.reconstruction.page import least_known, lost, meaning, next_steps, report, tell, view
@@ -117,14 +117,14 @@ def as_json(result: Reconstruction) -> dict[str, Any]:
     return figures
 
 
-def _solved(exact: Solved) -> str:
+def _solved(exact: SolvedPresses) -> str:
     """What solving the touched places changed."""
     return (
         f"  by the law's table it would be {exact.by_table.modulus_pa / 1e3:.2f} kPa ({exact.presses.said})"
     )
 
 
-def _held_out(told: HeldOut | None) -> dict[str, Any]:
+def _held_out(told: HeldOutErrors | None) -> dict[str, Any]:
     floor = told is not None and bool(told.floor)
     return {
         "held_out_rmse_n": told.model_n if told else None,

@@ -13,7 +13,7 @@ from palpate.mechanics.model.model import Model
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.show.page import subplots
-from palpate.show.quantities import KELVIN_VOIGT, MODULUS, Quantity
+from palpate.show.quantities import KELVIN_VOIGT, MODULUS, ShownQuantity
 from palpate.show.reconstruction.exploration import spread
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR
 from palpate.show.scenery import Colours, draw_object
@@ -121,7 +121,7 @@ def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None
     return figure
 
 
-def _limits(models: list[Model], key: str, quantity: Quantity) -> tuple[float, float]:
+def _limits(models: list[Model], key: str, quantity: ShownQuantity) -> tuple[float, float]:
     """Of the colours of one column of several models: without the outermost twentieth of the presses."""
     values = np.concatenate([m.presses.fits[key] for m in models]) * quantity.scale
     low, high = np.nanpercentile(values, [5, 95])
@@ -132,7 +132,7 @@ def _coloured(
     ax: Axes,
     model: Model,
     key: str,
-    quantity: Quantity,
+    quantity: ShownQuantity,
     limits: tuple[float, float],
     elevation_deg: float = 25.0,
 ) -> None:

@@ -8,7 +8,7 @@ import pytest
 from palpate.diagnosis.explore.segments import Instrument, Segment, join, split
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.recording.recording import read_recording, write_recording
-from palpate.mechanics.recording.segments import Segment as Stretch
+from palpate.mechanics.recording.segments import TimeSegment as Stretch
 
 
 def _rows(kind, n=400, at=0.0):

@@ -8,7 +8,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.specimen.yielding import machine_of, way_of
@@ -18,7 +18,7 @@ from palpate.show.material import as_json, in_words, lines
 RADIUS = 0.005
 
 
-def curves(modulus: float, stiffness: float, count: int = 3, slope: float = 0.0) -> list[Curve]:
+def curves(modulus: float, stiffness: float, count: int = 3, slope: float = 0.0) -> list[MachineCycle]:
     """In and out of a sphere on a deep sample by a machine of that stiffness (N/m), 0.3 % of noise."""
     rng, found = np.random.default_rng(1), []
     for k in range(count):
@@ -28,7 +28,7 @@ def curves(modulus: float, stiffness: float, count: int = 3, slope: float = 0.0)
         force = np.asarray(dent_law("sphere").force(np.maximum(dent, 0), modulus, 0.49, RADIUS))
         travel = dent + force / stiffness + 1e-3 * k
         read = force + slope * (travel - travel[0]) + 0.003 * force.max() * rng.standard_normal(len(force))
-        found.append(Curve(np.arange(len(dent)) / 100, travel, read + 0.1, f"curve {k}"))
+        found.append(MachineCycle(np.arange(len(dent)) / 100, travel, read + 0.1, f"curve {k}"))
     return found
 
 
@@ -38,7 +38,7 @@ def stiffness_for(modulus: float, share: float) -> float:
     return 16 / 9 * modulus * np.sqrt(RADIUS) * deep**1.5 / (share * deep)
 
 
-def material(given: list[Curve]):
+def material(given: list[MachineCycle]):
     tests = MachineTests("indentation", curves=tuple(given), tip_radius_m=RADIUS)
     return material_of(tests, [c.name for c in given], fast=True)
 
@@ -95,7 +95,7 @@ def test_an_answer_that_misses_more_than_a_constant_says_so_first():
     travel = 1e-3 * np.linspace(-0.15, 1, 400)
     swings = (travel > 0) * (1 + 0.5 * np.sin(1.3e4 * travel) + 0.01 * rng.standard_normal(400))
     swings[-1] = 1.7
-    made = material([Curve(np.arange(400) / 100, travel, swings, name) for name in "ab"])
+    made = material([MachineCycle(np.arange(400) / 100, travel, swings, name) for name in "ab"])
     assert made.missed > made.error["constant"] and not made.predicts
     assert "NO ANSWER" in lines(made)[0] and as_json(made)["predicts"] is False
 
@@ -116,7 +116,7 @@ def test_a_loop_of_creep_widens_the_interval_down_to_the_lasting_modulus_and_is_
     modulus = 20e3 * (1 + np.exp(-since / 0.4))
     force = np.asarray(dent_law("sphere").force(np.maximum(dent, 0), 1.0, 0.49, RADIUS)) * modulus
     force += 0.002 * force.max() * np.random.default_rng(2).standard_normal(len(force))
-    made = material([Curve(np.arange(len(dent)) / 100, dent, force, "one")])
+    made = material([MachineCycle(np.arange(len(dent)) / 100, dent, force, "one")])
     low, high = made.young_modulus_ci95_pa
     assert low < 20e3 < high and "creep, a late force or play" in " ".join(lines(made))
     assert "pulls" not in made.verdict, "noise alone pulls by no more"

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from palpate.diagnosis.specimen.bench import Curve
+from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.specimen.zero import late_contact
@@ -21,7 +21,7 @@ ANSWERS: dict[tuple, Material] = {}
 
 
 @cache
-def curve(seed: int, *, begins: float, zero: float = 0.0, modulus: float = MODULUS) -> Curve:
+def curve(seed: int, *, begins: float, zero: float = 0.0, modulus: float = MODULUS) -> MachineCycle:
     """In and out of a sphere; begins: travel of the first row over the deepest; zero: N that free air
     reads."""
     rng = np.random.default_rng(seed)
@@ -30,10 +30,10 @@ def curve(seed: int, *, begins: float, zero: float = 0.0, modulus: float = MODUL
     travel = np.concatenate([way, way[::-1]])
     force = np.asarray(dent_law("sphere").force(np.maximum(travel, 0), modulus, 0.49, RADIUS))
     read = force + zero + 0.003 * force.max() * rng.standard_normal(len(force))
-    return Curve(np.arange(len(travel)) / 100, travel + 0.01, read, f"curve {seed}")
+    return MachineCycle(np.arange(len(travel)) / 100, travel + 0.01, read, f"curve {seed}")
 
 
-def material(*curves: Curve) -> Material:
+def material(*curves: MachineCycle) -> Material:
     """The answer to some curves; tests that ask the same share it."""
     names = tuple((id(c), c.name) for c in curves)
     if names not in ANSWERS:

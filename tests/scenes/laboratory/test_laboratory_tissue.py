@@ -10,7 +10,7 @@ from palpate.mechanics.effects.jkr_adhesion import _set as set_adhesion
 from palpate.mechanics.effects.jkr_adhesion import edge_share
 from palpate.mechanics.effects.poroelasticity import LAW as POROUS
 from palpate.mechanics.effects.power_law_relaxation import prony_terms
-from palpate.mechanics.effects.settings import Touch
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.effects.viscoelasticity import LAW as PRONY
 from palpate.scenes.laboratory.effects import effect
 from palpate.scenes.laboratory.motion import Motion
@@ -81,7 +81,7 @@ def test_a_contact_that_sticks(touch, reach) -> None:
         "plane_strain_modulus_pa": E_STAR,
     }  # fmt: skip
     found = made("jkr_adhesion", keys, touch)
-    sticky = Touch()
+    sticky = TouchTerms()
     set_adhesion(sticky, keys, E_STAR, 0.0, RADIUS)
     assert found == pytest.approx(rendered(STICKY, sticky.numbers[STICKY], *touch), abs=0.01 * -found.min())
     pulls = 2 - 0.5 * edge_share(work, reach * RADIUS, E_STAR, RADIUS)

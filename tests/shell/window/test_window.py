@@ -17,7 +17,7 @@ from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.material import Ball
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import read_recording
-from palpate.operations.touch import Touched
+from palpate.operations.touch import ServoRun
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene, load_scene
 from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
@@ -449,7 +449,7 @@ def test_a_mouse_is_not_told_of_forces_sent_to_it(driven: Driven) -> None:
     press(driven)
     report = driven.session.report()
     lines = {
-        device: "\n".join(Touched(driven.window.scene, device, "fem", report, None, "").lines())
+        device: "\n".join(ServoRun(driven.window.scene, device, "fem", report, None, "").lines())
         for device in ("mouse", "simulated")
     }
     assert "N rendered" in lines["mouse"] and "sent" not in lines["mouse"]
