@@ -1,1 +1,2 @@
-"""What makes the fitted data that ships with the product: one module a file, `python -m tools.NAME`."""
+"""What makes the fitted data that ships with the product, and what shows that a move changed nothing
+(`goldens`): `python -m tools.NAME`."""

@@ -10,9 +10,10 @@ import numpy as np
 
 from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
 from palpate.mechanics.disk.schema import FileKey
-from palpate.mechanics.effects.base import Parameter, Scope
+from palpate.mechanics.effects.base import Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
+from palpate.mechanics.quantities import number_words
 
 
 def _stiffer(scene: TouchedScene) -> np.ndarray:
@@ -40,6 +41,13 @@ def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[
     }
 
 
+def _words(keys: Keys) -> str:
+    low, high = sorted((keys["ratio_softest_place"], keys["ratio_stiffest_place"]))
+    few, many = number_words(low), number_words(high)
+    places = "" if few == many else f", {few} to {many} from place to place"
+    return f"{number_words(keys['ratio'])} times as stiff as it should be{places}"
+
+
 EFFECT = NumericalEffect(
     name="mesh_stiffness",
     domain=DOMAIN,
@@ -52,6 +60,7 @@ EFFECT = NumericalEffect(
     ),
     keys={"ratio": FileKey(low=1e-3, high=1e3, required=True)},
     report=_report,
+    keys_in_words=_words,
     change=_change,
     advice="refine the mesh, use quadratic elements, or lower Poisson's ratio by steps (0.49, 0.47, 0.45) "
     "until the force no longer changes; check that the modulus is the one stated",

@@ -6,18 +6,19 @@ import copy
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.diagnosis.numerics.registry import NAMES, numerical
 from palpate.diagnosis.other_simulator.result import PARTS, SimulatedGap
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
+from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.registry import effect
 from palpate.show.diagnosis import place as place_gap
 from palpate.show.diagnosis.figures import curve_pictures, first_picture, press_pictures
 from palpate.show.diagnosis.figures import view as view_of_gap
-from palpate.show.diagnosis.parameters import number, plain_key
+from palpate.show.diagnosis.parameters import number, plain_key, short
 from palpate.show.diagnosis.words import AXIS_WORDS, chance_words, force_words, percent, share_words, spoken
 from palpate.show.page import Page, new_figure
 
@@ -41,7 +42,7 @@ STATED = {
     "stated_friction": "the friction that it was given",
     "stated_tip_radius": "the radius of the tip that it was given",
 }
-WORDS = {
+WORDS = {  # of keys of STATED and of numerical effects; physical effects have those of a diagnosis
     "share": "share",
     "never_felt": "of it never felt at all",
     "from_depth_m": "from a depth of",
@@ -108,23 +109,24 @@ def meaning(name: str) -> str:
     """What a flaw, a parameter or an effect is, in plain words."""
     if name in STATED:
         return STATED[name]
-    known: Any = numerical(name) if name in NAMES else effect(name)
+    known = _effect(name)
     return known.plain_words or known.words
 
 
 def keys_in_words(entry: EffectEntry) -> str:
-    """An entry's numbers with units that a hand knows."""
-    said, values = [], dict(entry.parameters)
-    if "ratio" in values:
-        ratio, *ends = (values.pop(f"ratio{place}") for place in ("", "_softest_place", "_stiffest_place"))
-        low, high = (number(x) for x in sorted(ends))
-        places = "" if low == high else f", {low} to {high} from place to place"
-        said.append(f"{number(ratio)} times as stiff as it should be{places}")
-    for key, value in values.items():
-        words, factor, unit = plain_key(key)
-        shown = "none: it sticks" if value is None else number(value, factor)
-        said.append(f"{WORDS.get(key, words)} {shown} {unit}".strip())
-    return ", ".join(said)
+    """An entry's numbers with units that a hand knows. What a key means is for its effect to say: `ratio` is
+    one number of a mesh, and a list of a stiffness field."""
+    keys = entry.parameters
+    if entry.name in STATED:
+        return short({k: "none: it sticks" if v is None else v for k, v in keys.items()}, WORDS)
+    in_words = _effect(entry.name).keys_in_words
+    if in_words is not None and keys:
+        return in_words(keys)
+    return short(keys, WORDS if entry.name in NAMES else {})
+
+
+def _effect(name: str) -> Effect:
+    return numerical(name) if name in NAMES else effect(name)
 
 
 LITTLE = 0.5

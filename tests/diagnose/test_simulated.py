@@ -21,13 +21,15 @@ from palpate.diagnosis.other_simulator.forces import (
     sorted_forces,
     spread_out,
 )
-from palpate.diagnosis.other_simulator.parts import StatedParameter
+from palpate.diagnosis.other_simulator.parts import PARAMETER_OF, StatedParameter
 from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
 from palpate.diagnosis.other_simulator.stated import StatedForward, stated_of
 from palpate.diagnosis.pipeline import diagnose
+from palpate.diagnosis.verdict.result import EffectEntry
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.effects.registry import NAMES as PHYSICAL
+from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
@@ -36,7 +38,7 @@ from palpate.mechanics.progress import silent
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.registry import create
 from palpate.render.replay import replay
-from palpate.show.other_simulator import lead
+from palpate.show.other_simulator import keys_in_words, lead
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -373,3 +375,40 @@ def test_what_was_stated_is_read_over_the_models_own(world):
         with pytest.raises(OptionError, match="--stated"):
             stated_of(wrong, model)
     assert dataclasses.replace(stated, given=frozenset()).as_json()["friction"] is None
+
+
+def key_sets(world):
+    """{name of an effect: every set of keys that an answer can carry of it}; {} where nothing is fitted."""
+    real, presses, force = world[2].forward, world[1].presses, world[3]
+    forward = StatedForward(real.touches, real.places, stated_of({}, world[1]))
+    sets = {name: [{}] for name in (*NAMES, *PHYSICAL)}
+    for each in (*numericals(), *effects()):
+        values = [each.ideal, *each.starts()] if each.parameters else []
+        sets[each.name] += [each.report(np.asarray(v, float), forward, 20e3) for v in values]
+    at = np.column_stack([np.interp(presses.t, world[0].t, f) for f in force.T])
+    flickering = np.where(np.random.default_rng(0).random((len(at), 1)) < 0.2, 0.0, at)
+    for seen in (flickering, passed_through(presses, at, (2, 5, 7), turns=True)):
+        for name, (_, keys) in seen_in_samples(signal_of(presses, seen))[1].items():
+            sets[name].append(keys)
+    for name in PARAMETER_OF:
+        sets[name] = [{"stated": given, "measured": said} for given in (0.3, None) for said in (0.2, None)]
+    return sets
+
+
+def test_every_effect_has_words_for_all_the_keys_that_an_answer_can_carry_of_it(world):
+    """Names share keys: `ratio` is a number of a mesh and a list of a stiffness field."""
+    sets = key_sets(world)
+    assert set(sets) == {*NAMES, *PHYSICAL, *PARAMETER_OF}
+    assert {"share", "never_felt", "from_depth_m"} in map(set, sets["tunnelling"])
+    said = {}
+    for name, keys in sets.items():
+        for each in keys:
+            entry = EffectEntry(name, "object", 0.9, 0.01, 0.5, (0.4, 0.6), each)
+            said[name] = keys_in_words(entry)
+            assert bool(said[name]) == bool(each), (name, each)
+    assert said["tool_compliance"].startswith("the tool's stiffness")
+    assert said["contact_stiffness"].startswith("stiffness of the contact")
+    assert said["time_delay"].startswith("force reads late by") and said["time_step"].startswith("late by")
+    assert said["mesh_stiffness"] == "0.82 times as stiff as it should be"
+    assert "times the object's modulus" in said["stiffness_field"]
+    assert said["stated_friction"] == "given none: it sticks, measured none: it sticks"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from palpate.diagnosis.verdict.result import Diagnosis
@@ -58,9 +60,12 @@ def plain_key(key: str, value: Any = None) -> tuple[str, float, str]:
     return WORDS.get(key, split_key(key)[0].replace("_", " ")), factor, unit
 
 
-def short(parameters: dict[str, Any]) -> str:
-    """Parameters in one line."""
-    return ", ".join(f"{plain_key(key)[0]} {quantity_words(key, value)}" for key, value in parameters.items())
+def short(parameters: Mapping[str, Any], words: Mapping[str, str] = MappingProxyType({})) -> str:
+    """Parameters in one line. words: of keys that are called something else here."""
+    return ", ".join(
+        f"{words.get(key) or plain_key(key)[0]} {quantity_words(key, value)}"
+        for key, value in parameters.items()
+    )
 
 
 def parameter_rows(result: Diagnosis) -> list[list[str]]:
