@@ -1,7 +1,8 @@
 """What a diagnosis can be set to: how much is tried, what decides a name, how wide our own errors are.
 
 All numbers that decide a name are in `AttributionOptions`; beside them stand the weights of evidence and
-closure, fitted to cases of known truth (search/naming.toml).
+closure, fitted to cases of known truth (search/naming.toml). Widths of our own errors default to their table
+(mechanics.own_errors).
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from scipy.special import logit
 
 from palpate.mechanics.effects.registry import known
 from palpate.mechanics.options import EXACT, option
+from palpate.mechanics.own_errors import DepthLaw, Direction, FirstTouch, Repeats, Slip, Stiffness, Unnamed
 
 
 @dataclass(frozen=True)
@@ -77,11 +79,21 @@ class AttributionOptions:
 class NuisanceOptions:
     """One standard deviation of what the baseline may get wrong, before it counts as a gap."""
 
-    onset_m: float = option(0.2e-3, "error of first touch, each press", unit="m")
-    site_stiffness: float = option(0.03, "share by which a site's stiffness may be wrong (shape, mesh)")
-    press_stiffness: float = option(0.01, "share by which repeats at a site may differ")
-    tilt: float = option(0.03, "error of a site's normal", unit="rad")
-    stick: float = option(0.25, "share by which the tangential force may be wrong, each press")
-    law: float = option(0.02, "share by which a site's depth law may bend wrongly over the depth reached")
-    floor_share: float = option(0.01, "error of the model that no name covers, share of a sample's force")
-    floor_n: float = option(0.002, "error of the model that no name covers, each thinned component", unit="N")
+    onset_m: float = option(FirstTouch.diagnosis.value, "error of first touch, each press", unit="m")
+    site_stiffness: float = option(
+        Stiffness.diagnosis.value, "share by which a site's stiffness may be wrong (shape, mesh)"
+    )
+    press_stiffness: float = option(Repeats.diagnosis.value, "share by which repeats at a site may differ")
+    tilt: float = option(Direction.diagnosis.value, "error of a site's normal", unit="rad")
+    stick: float = option(
+        Slip.diagnosis.value, "share by which the tangential force may be wrong, each press"
+    )
+    law: float = option(
+        DepthLaw.diagnosis.value, "share by which a site's depth law may bend wrongly over the depth reached"
+    )
+    floor_share: float = option(
+        Unnamed.share.value, "error of the model that no name covers, share of a sample's force"
+    )
+    floor_n: float = option(
+        Unnamed.force.value, "error of the model that no name covers, each thinned component", unit="N"
+    )

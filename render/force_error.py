@@ -1,8 +1,8 @@
 """What a rendered force may be off by: the law itself, the felt shape, where the first touch lay.
 
-Half widths of 95 % intervals, N. The law's own share of the force was fitted to solved presses at places of
-known shapes (benchmarks.law_bound): it grows with the depth, on curved ground, beside rims and above the
-base, and where a push along the normal also moves the surface sideways.
+Half widths of 95 % intervals, N. The law's own share of the force (mechanics.own_errors.Bound) grows with the
+depth, on curved ground, beside rims and above the base, and where a push along the normal also moves the
+surface sideways.
 """
 
 from __future__ import annotations
@@ -13,20 +13,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.contact.edges import nearness
+from palpate.mechanics.own_errors import Bound
 from palpate.mechanics.quantities import USUAL_POISSON_RATIO
 from palpate.render.base import Renderer
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.render.surface.snapping import ONSET_NOISE_M
 
-FLOOR, DEEP_SHARE, BENT_SHARE, SIDEWAYS_SHARE = 0.02, 0.02, 0.03, 0.1
-RIM_SHARE, BASE_SHARE = 0.2, 0.6
-RATIO_SHARE, SLIP_SHARE, SLIPPERY = 0.25, 0.05, 0.15
-"""Floor; then by a tip radius of depth, by |curvature| times depth, by the surface's way sideways, by how
-near a rim and the base; by Poisson's ratio below the usual one; by slip, a tip radius deep, which fades by
-that coefficient. Of 317 presses at 32 places of eight shapes (`bench law-bound`, seed 41) 3.5 % lie beyond,
-beside a plate's rim and at the lip of a waist, where the law is up to 13 % too soft. At 0.3 mm from a block's
-rim it is 18 % too soft a tenth of a radius deep."""
 _SURE = 1.96
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
@@ -117,13 +110,13 @@ def law_share(
     """Half width of the law's 95 % interval over the force; depth in tip radii, the next four: place_numbers;
     friction: Coulomb's coefficient."""
     terms = (
-        FLOOR,
-        DEEP_SHARE * depth,
-        BENT_SHARE * bent * depth,
-        SIDEWAYS_SHARE * sideways,
-        RIM_SHARE * rim,
-        BASE_SHARE * base,
-        RATIO_SHARE * max(USUAL_POISSON_RATIO - poisson_ratio, 0.0),
-        SLIP_SHARE * np.exp(-friction / SLIPPERY) * depth,
+        Bound.floor.value,
+        Bound.deep.value * depth,
+        Bound.bent.value * bent * depth,
+        Bound.sideways.value * sideways,
+        Bound.rim.value * rim,
+        Bound.base.value * base,
+        Bound.ratio.value * max(USUAL_POISSON_RATIO - poisson_ratio, 0.0),
+        Bound.slip.value * np.exp(-friction / Bound.slippery.value) * depth,
     )
     return np.sqrt(sum(np.square(term) for term in terms))

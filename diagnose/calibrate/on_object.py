@@ -32,6 +32,7 @@ from palpate.mechanics.effects.tool_compliance import EFFECT as SPRING
 from palpate.mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.own_errors import Level
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.mechanics.recording.recording import Recording
@@ -40,8 +41,6 @@ from palpate.reconstruction.presses_on_model import presses_on
 TRUSTED = ("tip", "gain")
 FITTED = (SPRING, GAIN, DELAY, PLAY)
 """Effects that a press on a known object shows, fitted together."""
-MODULUS_SD = 0.02
-"""Share by which law and mesh may miss a known modulus."""
 STIFFEST = 1e6
 """N/m: a tool that bends less is rigid here."""
 _DRAWS = 400
@@ -100,7 +99,7 @@ def _calibration(
     drawn = rng.multivariate_normal(found.values, spread, _DRAWS, check_valid="ignore")
     drawn = np.clip(drawn, *bounds_of(found.effects)[:2])
     rigid = _rigid_give(offsets)
-    known = modulus_pa * np.exp(MODULUS_SD * rng.standard_normal(_DRAWS))
+    known = modulus_pa * np.exp(Level.calibration.value * rng.standard_normal(_DRAWS))
     give = rigid[0] + rigid[1] * rng.standard_normal(_DRAWS)
     normal = forward.model.support.normal
     here = instrument_of(found, found.values, modulus_pa, rigid[0], normal, trust)

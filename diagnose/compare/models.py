@@ -25,13 +25,13 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.model.one_d_laws import LAWS as ONE_D_LAWS
 from palpate.mechanics.model.one_d_laws import RIVALS as RIVALS
 from palpate.mechanics.model.one_d_laws import OneDLaws, forces_of, spread_law
+from palpate.mechanics.own_errors import DepthLaw
 from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.presses.table import MARGIN_S, Presses
 from palpate.mechanics.progress import Progress, silent
 from palpate.reconstruction.steps.s6_one_d import columns, fit_robust, low_passed
 from palpate.reconstruction.steps.s7_modulus.modulus_field import (
-    LAW_ERROR,
     FieldSites,
     PressModuli,
     asked_for,
@@ -90,7 +90,7 @@ def prepare(
     solved = touch_sites(
         model.mesh, table.point, table.normal, model.material.poisson_ratio, solver=solver, progress=progress
     )
-    table = touched_by_law(table, solved, LAWS, LAW_ERROR, table.noise.raw_n)
+    table = touched_by_law(table, solved, LAWS, DepthLaw.field.value, table.noise.raw_n)
     smooth = low_passed(table)
     presses = replace(smooth, force=table.net.force).window(MARGIN_S, MARGIN_S)
     unit = {
@@ -194,7 +194,7 @@ def as_touched(force: Callable[[np.ndarray], np.ndarray], presses: Presses, firs
     found = force(np.zeros(len(presses)))
     if first_touch == "read" or not (stated > 0).any():
         return found
-    variance = presses.noise.raw_n**2 + LAW_ERROR**2 * (presses.force**2).sum(axis=1) / 3
+    variance = presses.noise.raw_n**2 + DepthLaw.field.value**2 * (presses.force**2).sum(axis=1) / 3
     least = np.full(len(presses), np.inf)
     for z in np.linspace(-MOST_MOVED, MOST_MOVED, MOVES):
         tried = force(z * stated)

@@ -29,6 +29,7 @@ from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL_COMPLIANCE
 from palpate.mechanics.options import option
+from palpate.mechanics.own_errors import FirstTouch, Stiffness
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.statistics import squared_exponential
 from palpate.reconstruction.shapes.outline import farthest_points
@@ -113,9 +114,9 @@ def support_gain(weighing: Weighing, causes: Causes, at: float) -> tuple[float, 
 
 SPACING_M = 0.008
 """Between places that are weighed."""
-TOUCH_ERROR_M = 0.0002
+TOUCH_ERROR_M = FirstTouch.next_touch.value
 """Of one first touch."""
-PLACE_ERROR = 0.05
+PLACE_ERROR = Stiffness.next_touch.value
 """Of a press's modulus, relative: what shape and law do to a place, which neighbours share."""
 LIGHT_M = 0.0025
 """Depth of a touch that only asks where the surface is."""

@@ -27,6 +27,7 @@ from palpate.diagnosis.explore.weighing import Act, Weighing, weigh
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import AttributionOptions
 from palpate.mechanics.effects.registry import effect
+from palpate.mechanics.own_errors import Smallest
 
 NONE = "none"
 FALSE_ALARMS = 0.02
@@ -35,7 +36,7 @@ SIZES = np.geomspace(1.0, 100.0, 13)
 """Sizes of a cause that are weighed, times `least_n`."""
 SMALL = np.linspace(0.0, 1.0, 5)
 """Sizes that are none, times `least_n`: what is too small to matter, a cause or an error of ours alike."""
-LEAST_SHARE = 0.01
+LEAST_SHARE = Smallest.exploring.value
 """Of the force: a smaller change does not matter, however plainly many presses show it."""
 TWO_SIGNED = frozenset({"inclusion"})
 """A form of which may as well be the other way round."""

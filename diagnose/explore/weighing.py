@@ -4,7 +4,8 @@ What evidence is weighed from: every form of a cause as a change of force, besid
 
 The likelihood is Gaussian and linear about the ideal model: the modulus is free; first touches, places and
 the law's own errors (those of one place and those that all places share) have widths of their own
-(diagnose.search.whiten, COMMON); every form of a cause is a column, the change of force that it brings about.
+(mechanics.own_errors, diagnose.search.whiten); every form of a cause is a column, the change of force that it
+brings about.
 """
 
 from __future__ import annotations
@@ -33,6 +34,16 @@ from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.effects.settings import ForwardSettings
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.own_errors import (
+    DepthLaw,
+    Direction,
+    FiniteStrain,
+    FirstTouch,
+    Latency,
+    Slip,
+    Stiffness,
+    Unnamed,
+)
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.statistics import squared_exponential
 from palpate.reconstruction.steps.s5_mesh.meshing import uncertainty_at
@@ -117,20 +128,8 @@ def softer(compliance: np.ndarray) -> Act:
 LEAST_PRESSES = 6
 SUPPORT_GIVES = 1.5e-5
 """m/N, standard deviation of what a support or its tracing seems to yield by itself."""
-COMMON = {
-    "bend": 0.03, "sideways": 0.15, "late": 0.0005, "onset": 0.05e-3, "strain": 0.6, "turned": 0.02,
-    "upward": 0.03,
-}  # fmt: skip
-"""Standard deviations of errors of our own that all places share: share by which the law of depth bends
-wrongly; share of the sideways force; s by which the force is late; m of all first touches; share of finite
-strain; rad by which forces are turned about each axis of the device; share of the push that goes up or down
-along the surface."""
-TAILS = 3.0
-"""Degrees of freedom of the running shape's error at a touch."""
-NUISANCE = NuisanceOptions(floor_share=0.0)
+NUISANCE = NuisanceOptions(floor_share=Unnamed.share_exploring.value)
 """As a diagnosis has them, but that 'none' holds what is small against the force already."""
-FIELD_M = 0.03
-"""Distance over which neighbours share what a place's stiffness may be off by."""
 LITTLE = 0.1
 """1/m, of compliance for unit modulus, small against a place's own (some 10)."""
 
@@ -214,7 +213,8 @@ def first_touch_sd(onset: np.ndarray, usual_m: float) -> np.ndarray:
     A running shape passes single touches by millimetres (an edge, a face that nobody touched yet); as
     Gaussians of the usual width these would rule out every hypothesis but one that moves them.
     """
-    return np.sqrt((TAILS * usual_m**2 + onset**2) / (TAILS + 1))
+    tails = FirstTouch.tails.value
+    return np.sqrt((tails * usual_m**2 + onset**2) / (tails + 1))
 
 
 def _spring(forward: Forward, found: Fit, act: Act) -> float:
@@ -297,7 +297,7 @@ def common_errors(forward: Forward, found: Fit, before: np.ndarray, site_sd: np.
         return np.nan_to_num(forward.predict(change)) - before
 
     settings = settings_of(forward, (), found.values, found.onset)
-    settings.onset = settings.onset + COMMON["onset"]
+    settings.onset = settings.onset + FirstTouch.common.value
     late = np.zeros_like(before)
     for part in t.parts:
         if part.stop - part.start > 2:
@@ -312,13 +312,13 @@ def common_errors(forward: Forward, found: Fit, before: np.ndarray, site_sd: np.
     up[:, 0] = 0.0
     field = np.linalg.cholesky(_field(t.point, site_sd) + 1e-9 * np.eye(len(t)))
     return [
-        before * (bend * COMMON["bend"])[:, None],
-        sideways * COMMON["sideways"],
-        late * COMMON["late"],
+        before * (bend * DepthLaw.common.value)[:, None],
+        sideways * Slip.common.value,
+        late * Latency.common.value,
         moved(settings),
-        moved(strain) * COMMON["strain"],
-        *(COMMON["turned"] * each for each in turned),
-        COMMON["upward"] * up * before[:, :1],
+        moved(strain) * FiniteStrain.common.value,
+        *(Direction.turned.value * each for each in turned),
+        Direction.upward.value * up * before[:, :1],
         *(before * column[t.press][:, None] for column in field.T),
     ]
 
@@ -326,4 +326,4 @@ def common_errors(forward: Forward, found: Fit, before: np.ndarray, site_sd: np.
 def _field(points: np.ndarray, site_sd: np.ndarray) -> np.ndarray:
     """(p, p) covariance of the share by which the stiffness of places (p, 3) m is off."""
     squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
-    return np.outer(site_sd, site_sd) * squared_exponential(squared, FIELD_M)
+    return np.outer(site_sd, site_sd) * squared_exponential(squared, Stiffness.shared_over.value)

@@ -1,7 +1,8 @@
 """What a simulator's numerics add: its force against our law's at its own stated parameters, on one path.
 
 The search is the one for physical effects (`diagnose.search`) with the numerical effects in its library. Its
-modulus is stated, not fitted; its noise is not a sensor's but what our own law may miss (`OWN_ERRORS`).
+modulus is stated, not fitted; its noise is not a sensor's but what our own law may miss
+(mechanics.own_errors).
 """
 
 from __future__ import annotations
@@ -25,16 +26,22 @@ from palpate.diagnosis.search.fit import Fit, parameter_intervals, settings_of
 from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours, never_worse
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.own_errors import DepthLaw, FirstTouch, Level, Repeats, Smallest, Stiffness, Unnamed
 from palpate.mechanics.presses.table import Noise
 from palpate.mechanics.progress import Progress, silent
 
-LEAST_SHARE = 0.02
+LEAST_SHARE = Smallest.simulator.value
 """Of the typical force, below which a numerical effect is not named: our own law is no better everywhere."""
-OWN_ERRORS = NuisanceOptions(
-    onset_m=0.1e-3, site_stiffness=0.03, press_stiffness=0.005, law=0.03, floor_share=0.015, floor_n=1e-3
+NUISANCE = NuisanceOptions(
+    onset_m=FirstTouch.simulator.value,
+    site_stiffness=Stiffness.simulator.value,
+    press_stiffness=Repeats.simulator.value,
+    law=DepthLaw.simulator.value,
+    floor_share=Unnamed.share_simulator.value,
+    floor_n=Unnamed.force_simulator.value,
 )
 """One standard deviation of what our law misses on the surface that a simulator was given too."""
-COMMON_ERROR = 0.05
+COMMON_ERROR = Level.simulator.value
 """Share by which our law may be off everywhere alike: a stiffness within it is no mesh's."""
 
 
@@ -77,8 +84,8 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
     rules = dataclasses.replace(rules, smallest=1.0)
     strain = next(e for e in effects() if e.role is Role.KNOWN)
     search = Search(
-        forward, forward.stated.young_modulus_pa, nuisance=OWN_ERRORS, options=rules,
-        site_sd=np.full(len(t), OWN_ERRORS.site_stiffness), finite_strain=strain,
+        forward, forward.stated.young_modulus_pa, nuisance=NUISANCE, options=rules,
+        site_sd=np.full(len(t), NUISANCE.site_stiffness), finite_strain=strain,
     )  # fmt: skip
     tried = [e for e in numericals() if e.see is None]
     found = attribute(search, tried, progress=progress)

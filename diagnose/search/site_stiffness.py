@@ -8,11 +8,8 @@ from scipy.spatial import cKDTree
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import NuisanceOptions
 from palpate.diagnosis.search.fit import Fit
+from palpate.mechanics.own_errors import Repeats, Stiffness
 from palpate.mechanics.presses.table import Presses
-
-SHARE_PER_HEIGHT = 2.5
-"""Relative stiffness error a unit of surface error over the object's height (edges near a press count
-double)."""
 
 
 def site_stiffness_sd(forward: Forward, options: NuisanceOptions) -> np.ndarray:
@@ -29,7 +26,7 @@ def site_stiffness_sd(forward: Forward, options: NuisanceOptions) -> np.ndarray:
     spread = np.array(
         [np.sqrt(np.mean(model.shape_uncertainty_m[surface[i]] ** 2)) if len(i) else 0.0 for i in near]
     )
-    return np.sqrt(of_law**2 + (SHARE_PER_HEIGHT * spread / height) ** 2)
+    return np.sqrt(of_law**2 + (Stiffness.surface.value * spread / height) ** 2)
 
 
 def site_factors(found: Fit, touches: Presses) -> tuple[np.ndarray, np.ndarray]:
@@ -42,7 +39,7 @@ def site_factors(found: Fit, touches: Presses) -> tuple[np.ndarray, np.ndarray]:
         f, r = predicted[rows].ravel(), found.residual[rows].ravel()
         power = max(f @ f, 1e-12)
         factor[site] = 1 + f @ r / power
-        error[site] = np.sqrt(touches.noise_n**2 / power + 0.01**2)
+        error[site] = np.sqrt(touches.noise_n**2 / power + Repeats.verdict.value**2)
     return factor, error
 
 

@@ -22,6 +22,7 @@ from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.diagnosis.specimen.bench import PEAK_N, Bench
 from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.own_errors import DepthLaw, FirstTouch, Repeats, Unnamed
 from palpate.mechanics.presses.table import HOLDING, Presses
 from palpate.mechanics.progress import Progress, silent
 
@@ -113,8 +114,6 @@ def _ridge(x: np.ndarray, y: np.ndarray, penalty: float) -> np.ndarray:
     return np.linalg.solve(matrix, x.T @ y / len(x))
 
 
-_FLOOR = {False: 0.005, True: 0.02}
-"""Share of the peak by which the law may miss what no name covers: of one piece, of different ones."""
 _FOLDS, _ITERATIONS, _LEAST_HOLD = 6, 6, 8
 
 
@@ -136,11 +135,16 @@ def diagnose_bench(
 def _nuisance(bench: Bench) -> NuisanceOptions:
     """Pieces differ in more than their stiffness, and a machine's zero is worth what its load is: the
     floor is a share of the greatest."""
-    floor = _FLOOR[bench.specimens] * PEAK_N
-    plain = NuisanceOptions(floor_n=floor, floor_share=0.0)
+    of_peak = Unnamed.peak_pieces if bench.specimens else Unnamed.peak_one_piece
+    plain = NuisanceOptions(floor_n=of_peak.value * PEAK_N, floor_share=Unnamed.share_curves.value)
     if not bench.specimens:
         return plain
-    return dataclasses.replace(plain, press_stiffness=0.07, law=0.1, onset_m=0.5e-3)
+    return dataclasses.replace(
+        plain,
+        press_stiffness=Repeats.pieces.value,
+        law=DepthLaw.pieces.value,
+        onset_m=FirstTouch.pieces.value,
+    )
 
 
 def unseen_holds(bench: Bench, made: Diagnosis) -> tuple[float, float] | None:

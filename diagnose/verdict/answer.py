@@ -16,11 +16,7 @@ from palpate.diagnosis.search.gaps import modulus_share
 from palpate.diagnosis.search.site_stiffness import heterogeneity, site_factors
 from palpate.mechanics.effects.base import Role
 from palpate.mechanics.effects.registry import effect, effects
-
-# Share of the force by which full three-dimensional solves leave small-strain elasticity, against depth over
-# tip radius: fitted to labelled recordings, 1.4 % (rms) at 3-4 mm and 6 % at 4-8 mm with a tip of 5 mm.
-STRAIN_COEFFICIENT = 0.032
-STRAIN_EXPONENT = 2.4
+from palpate.mechanics.own_errors import FiniteStrain
 
 
 @dataclass(frozen=True)
@@ -149,7 +145,7 @@ def finite_strain_size(forward: Forward, found: Fit) -> float:
     force = np.linalg.norm(
         forward.predict(settings_of(forward, found.effects, found.values, found.likeliest)), axis=1
     )
-    change = STRAIN_COEFFICIENT * depth**STRAIN_EXPONENT * force
+    change = FiniteStrain.coefficient.value * depth**FiniteStrain.exponent.value * force
     return float(np.sqrt((change[t.counted] ** 2).mean()))
 
 

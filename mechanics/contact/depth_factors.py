@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-CONVERGENCE = 0.008
-"""Share of the force by which finer elements, shorter steps, a stiffer contact and a larger zone move a
-solution, together (benchmarks.press_solver): one standard deviation of what a solved place may be off by."""
+from palpate.mechanics.own_errors import Stiffness
+
 _DEGREE = 3
 
 
@@ -55,7 +54,7 @@ class DepthFactors:
 
     def law_error(self, usual: float) -> np.ndarray:
         """(k,) standard error of the law as a share of the force: the usual one where nothing is solved."""
-        return np.where(self.solved, min(usual, CONVERGENCE), usual)
+        return np.where(self.solved, min(usual, Stiffness.solved.value), usual)
 
     def at(self, place: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
         """(n,) factors at places (n,) and depths (n,) m."""

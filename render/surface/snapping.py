@@ -16,6 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.own_errors import FirstTouch
 from palpate.render.options import RenderOptions
 from palpate.render.surface.bvh import STACK, closest_triangle
 from palpate.render.surface.contact import outside
@@ -29,7 +30,7 @@ from palpate.render.surface.walking import place
 
 REACH_M = 0.012  # correlation length of shape errors: about a mesh edge
 DOUBT_M = 1e-3  # their size
-ONSET_NOISE_M = 6e-5  # of a first touch
+ONSET_NOISE_M = FirstTouch.felt_surface.value
 LARGEST_M = 4e-3  # a palpation further off than this is no witness of the surface
 
 

@@ -11,8 +11,8 @@ from palpate.diagnosis.options import DiagnoseOptions, NuisanceOptions
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
 from palpate.diagnosis.search.whiten import nuisance_columns
-from palpate.mechanics.contact.depth_factors import CONVERGENCE
 from palpate.mechanics.effects.finite_strain import EFFECT as STRAIN
+from palpate.mechanics.own_errors import Stiffness
 from palpate.mechanics.press_solver import solved_places
 from palpate.mechanics.press_solver.press import LAWS
 
@@ -65,7 +65,7 @@ def test_what_the_law_may_be_off_by_is_what_the_solver_is(forwards):
     plain, exact = forwards
     options = NuisanceOptions()
     assert (site_stiffness_sd(plain, options) == options.site_stiffness).all()
-    np.testing.assert_allclose(site_stiffness_sd(exact, options), CONVERGENCE)
+    np.testing.assert_allclose(site_stiffness_sd(exact, options), Stiffness.solved.value)
     tight = NuisanceOptions(site_stiffness=0.001)
     np.testing.assert_allclose(site_stiffness_sd(exact, tight), 0.001)  # what was asked for is not widened
     shares = []
@@ -76,7 +76,7 @@ def test_what_the_law_may_be_off_by_is_what_the_solver_is(forwards):
         _, bend = nuisance_columns(forward, own, force, options, None, onset_sd)[-1]
         felt = force[:, 0] > 0
         shares.append(bend[felt, 0] / force[felt, 0])
-    np.testing.assert_allclose(shares[1], CONVERGENCE / options.law * shares[0])
+    np.testing.assert_allclose(shares[1], Stiffness.solved.value / options.law * shares[0])
 
 
 def test_a_diagnosis_says_what_was_solved(bench, monkeypatch):

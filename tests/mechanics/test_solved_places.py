@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.mechanics.contact.depth_factors import CONVERGENCE, DepthFactors
+from palpate.mechanics.contact.depth_factors import DepthFactors
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.own_errors import Stiffness
 from palpate.mechanics.press_solver import solved_places
 from palpate.mechanics.press_solver.solved_places import (
     PlacesToSolve,
@@ -82,7 +83,8 @@ def test_a_place_that_one_law_cannot_solve_keeps_every_law(monkeypatch):
     assert exact.unsolved == 1 and exact.solved.tolist() == [True, False, True, False]
     for factors in exact.factors.values():
         np.testing.assert_allclose(factors.at(np.arange(4), np.full(4, 2e-3)), [0.9, 1, 0.9, 1])
-        np.testing.assert_allclose(factors.law_error(0.03), [CONVERGENCE, 0.03, CONVERGENCE, 0.03])
+        solved = Stiffness.solved.value
+        np.testing.assert_allclose(factors.law_error(0.03), [solved, 0.03, solved, 0.03])
     assert exact.of(np.array([False, True, True, False])).solved.tolist() == [False, True]
 
 

@@ -20,6 +20,7 @@ from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.depth_factors import DepthFactors
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import EXACT, option
+from palpate.mechanics.own_errors import DepthLaw, Level
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.statistics import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
 from palpate.reconstruction.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
@@ -47,10 +48,14 @@ class ModulusOptions:
         None, "leave out samples deeper than this; None: none", unit="m", flag="--greatest-depth"
     )
     law_error: float = option(
-        0.03, "error of the law as a share of the force; weights deep samples down", flag="--law-error"
+        DepthLaw.modulus.value,
+        "error of the law as a share of the force; weights deep samples down",
+        flag="--law-error",
     )
     law_bias: float = option(
-        0.02, "standard error common to all presses (law, mesh), as a share of the modulus", flag="--law-bias"
+        Level.modulus.value,
+        "standard error common to all presses (law, mesh), as a share of the modulus",
+        flag="--law-bias",
     )
     bootstraps: int = option(1000, "resamples of the sites that choose a dent law", flag="--bootstraps")
     exact: bool = option(False, EXACT)

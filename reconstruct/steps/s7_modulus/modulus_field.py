@@ -33,6 +33,7 @@ from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.effects import stiffness_field
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.options import option
+from palpate.mechanics.own_errors import DepthLaw, Level
 from palpate.mechanics.presses.table import Presses
 from palpate.reconstruction.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
@@ -47,14 +48,12 @@ LEAST_SITES = 5
 """A field is four numbers (level, spread, length, scatter beside it): fewer places than that and one more
 tell no field. How many rows a place has does not matter: its modulus's own error does."""
 REFITS = 1
-LAW_ERROR = 0.03
-LEVEL_BIAS = 0.02
-"""Standard error of the level that no press tells: law and mesh, as of a global modulus
-(reconstruct.steps.s7_modulus.modulus.ModulusOptions.law_bias)."""
-DENT_DEPTH_SD = 0.25
+LAW_ERROR = DepthLaw.field.value
+LEVEL_BIAS = Level.field.value
+"""Standard error of the level that no press tells: law and mesh, as of a global modulus."""
+DENT_DEPTH_SD = DepthLaw.dent_depth.value
 """In tip radii: a dent feels a volume, of which no press tells how deep its middle lies; standard deviation
-from the depth at which its modulus is taken (mechanics.compliance.smooth_field). Chosen on slabs 1 to 3 of
-'palpate bench field'."""
+from the depth at which its modulus is taken (mechanics.compliance.smooth_field)."""
 
 
 @dataclass(frozen=True)

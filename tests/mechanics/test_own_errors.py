@@ -1,0 +1,63 @@
+"""One table of our own errors: every number says what it is and whence, and options default to it."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import fields
+from typing import get_args
+
+from palpate.diagnosis.options import NuisanceOptions
+from palpate.mechanics import own_errors
+from palpate.mechanics.own_errors import (
+    ERRORS,
+    DepthLaw,
+    Direction,
+    FirstTouch,
+    Level,
+    OwnError,
+    Reach,
+    Repeats,
+    Slip,
+    Stiffness,
+    Unnamed,
+    entries,
+)
+from palpate.mechanics.quantities import parse_unit
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusOptions
+
+
+def test_every_number_states_its_unit_what_it_is_of_and_its_source():
+    for name, entry in entries().items():
+        parse_unit(entry.unit)
+        assert entry.value >= 0, name
+        assert entry.of and entry.source and entry.reach in get_args(Reach), name
+
+
+def test_no_error_is_left_out_of_the_table():
+    written = {
+        c for c in vars(own_errors).values() if inspect.isclass(c) and c.__module__ == own_errors.__name__
+    }
+    assert written - {OwnError} == set(ERRORS)
+    assert all(isinstance(n, OwnError) for e in ERRORS for k, n in vars(e).items() if not k.startswith("_"))
+
+
+def test_options_default_to_the_table():
+    defaults = {
+        NuisanceOptions: {
+            "onset_m": FirstTouch.diagnosis,
+            "site_stiffness": Stiffness.diagnosis,
+            "press_stiffness": Repeats.diagnosis,
+            "tilt": Direction.diagnosis,
+            "stick": Slip.diagnosis,
+            "law": DepthLaw.diagnosis,
+            "floor_share": Unnamed.share,
+            "floor_n": Unnamed.force,
+        },
+        ModulusOptions: {"law_error": DepthLaw.modulus, "law_bias": Level.modulus},
+    }
+    assert set(defaults[NuisanceOptions]) == {f.name for f in fields(NuisanceOptions)}
+    for options, entry_of in defaults.items():
+        for field in fields(options):
+            if field.name in entry_of:
+                entry = entry_of[field.name]
+                assert field.default == entry.value and (field.metadata["unit"] or "1") == entry.unit
