@@ -217,8 +217,8 @@ def squeezed_mesh(cells: int) -> TetMesh:
 def _code_of(adapter: str) -> tuple[str, ...]:
     """What its forces depend on beside what it is given: its version, and our files that ask it."""
     home = Path(base.__file__).parent
-    names = adapter.replace("-", "_"), "base"
-    return version(adapter), *((home / f"{name}.py").read_text() for name in names)
+    files = *sorted(home.glob(f"{adapter.replace('-', '_')}*.py")), home / "base.py"
+    return version(adapter), *(file.read_text() for file in files)
 
 
 class Runs:

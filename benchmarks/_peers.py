@@ -22,7 +22,7 @@ from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import nearest_nodes
 from palpate.render.options import RenderOptions
 from palpate.render.simulators.mujoco import POISSON_LIMIT as FLEX_POISSON
-from palpate.render.simulators.mujoco import flex_xml
+from palpate.render.simulators.mujoco import MujocoSettings, scene_xml
 
 NEAR_M = 0.009
 """Around a place: where a tip may touch, for a solver that is told of nodes."""
@@ -173,7 +173,12 @@ class Flex(Peer):
 
         self.mujoco, self.radius_m = mujoco, radius_m
         nu = min(poisson, FLEX_POISSON)
-        xml = flex_xml(mesh, TIMESTEP_S, young_pa=young_pa, poisson=nu, radius_m=radius_m)
+        xml = scene_xml(
+            mesh,
+            radius_m,
+            {"young_modulus_pa": young_pa, "poisson_ratio": nu, "friction": 0.5},
+            MujocoSettings(TIMESTEP_S, 0.02),
+        )
         self.model = mujoco.MjModel.from_xml_string(xml)
 
     def force(self, point: np.ndarray, normal: np.ndarray, depths_m: np.ndarray) -> np.ndarray:

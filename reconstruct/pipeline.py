@@ -22,7 +22,6 @@ from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
 from palpate.mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.recording.recording import Recording, base_model_of
 from palpate.mechanics.result import Result
-from palpate.reconstruction.background_mesher import BackgroundMesher
 from palpate.reconstruction.checks.finding import Finding, outcome_of
 from palpate.reconstruction.checks.registry import CheckupRun
 from palpate.reconstruction.geometry.known_shape import place
@@ -48,6 +47,7 @@ from palpate.reconstruction.steps.s4_surface import (
     reconstruct_surface,
     shape_table,
 )
+from palpate.reconstruction.steps.s5_mesh.background import BackgroundMesher
 from palpate.reconstruction.steps.s5_mesh.meshing import Meshing, uncertainty_at
 from palpate.reconstruction.steps.s6_one_d import OneD, columns, profiles
 from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors, held_out, modulus_by_others

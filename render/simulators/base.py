@@ -1,5 +1,8 @@
 """What an adapter of another simulator is, and the renderer that drives one.
 
+Its scene (mesh, contact, solver, step) is built in one place, for the renderer and for `palpate export`: by
+`render/simulators/NAME.py`, or where the export is a script by `NAME_scene.py`, which that script holds.
+
 An adapter makes a `World` whenever the tip comes near to the object: the body at rest, the tip in the air.
 The world is stepped along the path until the tip is away again. So what a press leaves behind (creep, drift)
 does not reach the next, and free air costs nothing.
@@ -8,6 +11,7 @@ does not reach the next, and free air costs nothing.
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import importlib.metadata
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -39,45 +43,51 @@ class World(Protocol):
         """(3,) N on the tool once the tip's centre, (3,) m, is there, dt_s after the last step."""
 
 
-class SteppedWorld(ABC):
-    """One touch in a simulator that has a time step of its own: the tip is led along straight lines from
-    sample to sample, in whole steps; what is left of a sample goes to the next."""
+class Touch(Protocol):
+    """A touch in a simulator that has a time step of its own."""
 
-    def __init__(self, tip: np.ndarray, timestep_s: float) -> None:
-        self._tip, self._left, self._force = np.array(tip, dtype=float), 0.0, np.zeros(3)
-        self._timestep_s = timestep_s
+    timestep_s: float
 
-    @abstractmethod
     def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:
         """One step of the simulator's own, at whose end the tip's centre is there; (3,) m, (3,) m/s."""
 
-    @abstractmethod
     def force(self) -> np.ndarray:
         """(3,) N on the tool after the last step."""
+
+
+class SteppedWorld:
+    """Such a touch, whose tip is led along straight lines from sample to sample, in whole steps; what is left
+    of a sample goes to the next."""
+
+    def __init__(self, touch: Touch, tip: np.ndarray) -> None:
+        self._touch = touch
+        self._tip, self._left, self._force = np.array(tip, dtype=float), 0.0, np.zeros(3)
 
     def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
         """As `World.step`."""
         self._left += dt_s
-        count = int(self._left / self._timestep_s + 1e-9)
-        self._left -= count * self._timestep_s
+        count = int(self._left / self._touch.timestep_s + 1e-9)
+        self._left -= count * self._touch.timestep_s
         way = (np.asarray(tip, dtype=float) - self._tip) / max(count, 1)
         for _ in range(count):
             self._tip = self._tip + way
-            self.advance(self._tip, way / self._timestep_s)
+            self._touch.advance(self._tip, way / self._touch.timestep_s)
         if count:
-            self._force = self.force()
+            self._force = self._touch.force()
         return self._force
 
 
 class Adapter(ABC):
     """One simulator. units: what it computes in. cannot: what it cannot say, a line each. advice: by
-    numerical effect, in its own words. extra: the package's extra that installs it."""
+    numerical effect, in its own words. extra: the package's extra that installs it; needs: the modules that
+    it imports."""
 
     name: str
     units: str
     cannot: tuple[str, ...]
     advice: dict[str, str]
     extra: str
+    needs: tuple[str, ...] = ()
 
     poisson_limit = np.inf
     """The greatest Poisson's ratio that it is given."""
@@ -124,8 +134,9 @@ class Adapter(ABC):
 
 
 class SteppedAdapter(Adapter):
-    """One that is stepped (`SteppedWorld`), whose friction is a number, and whose settings have edge_radii:
-    a scene of the body and a tip serves all touches, but where its mesh is finer under each."""
+    """One that is stepped (`SteppedWorld`), whose friction is a number, and whose settings have
+    edge_radii: a scene of the body and a tip serves all touches, but where its mesh is finer under
+    each."""
 
     def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
         super().__init__(model, options, friction if np.isfinite(friction) else MOST_FRICTION)
@@ -136,17 +147,57 @@ class SteppedAdapter(Adapter):
         """What is made of a mesh and a tip of that radius."""
 
     @abstractmethod
-    def touch(self, scene: Any, tip: np.ndarray) -> World:
-        """A touch of its own in such a scene, as `begin`."""
+    def touch(self, scene: Any, tip: np.ndarray) -> Touch:
+        """A touch of its own in such a scene, whose tip is there."""
+
+    def mesh_under(self, tip: np.ndarray, radius_m: float) -> TetMesh:
+        """The mesh of a scene that begins with the tip there: the model's, finer under it where the settings
+        say so."""
+        edge = self.own.edge_radii
+        if not np.isfinite(edge):
+            return self.mesh
+        return self.mesh_around(tip, radius_m, edge * radius_m, 1.2 * radius_m)
 
     def begin(self, tip: np.ndarray, radius_m: float) -> World:
-        edge = self.own.edge_radii
-        if np.isfinite(edge):
-            fine = self.mesh_around(tip, radius_m, edge * radius_m, 1.2 * radius_m)
-            return self.touch(self.scene(fine, radius_m), tip)
-        if self._whole is None or self._whole[0] != radius_m:
-            self._whole = radius_m, self.scene(self.mesh, radius_m)
-        return self.touch(self._whole[1], tip)
+        if np.isfinite(self.own.edge_radii):
+            scene = self.scene(self.mesh_under(tip, radius_m), radius_m)
+        else:
+            if self._whole is None or self._whole[0] != radius_m:
+                self._whole = radius_m, self.scene(self.mesh, radius_m)
+            scene = self._whole[1]
+        return SteppedWorld(self.touch(scene, tip), tip)
+
+
+class ScriptedAdapter(SteppedAdapter):
+    """One whose scene is built by a module that imports nothing of ours: `palpate export` writes a script
+    that holds it. The module has Scene(**given) with `given` as below, and Touch(scene, tip)."""
+
+    scene_module: str
+
+    def given(self, mesh: TetMesh, radius_m: float) -> dict[str, Any]:
+        """What a scene is made of: points (n, 3) m, tetrahedra (m, 4), fixed nodes (f,), up (3,); numbers by
+        name: of the tip, the material and the settings, but for the mesh's."""
+        numbers = {"radius_m": radius_m, **self.stated, **dataclasses.asdict(self.own)}
+        return {
+            "points": mesh.points,
+            "tetrahedra": mesh.tetrahedra,
+            "fixed": np.flatnonzero(mesh.fixed),
+            "up": self.model.support.normal,
+            **{key: value for key, value in numbers.items() if key not in ("tip_radius_m", "edge_radii")},
+        }
+
+    def scene(self, mesh: TetMesh, radius_m: float) -> Any:
+        return importlib.import_module(self.scene_module).Scene(**self.given(mesh, radius_m))
+
+    def touch(self, scene: Any, tip: np.ndarray) -> Touch:
+        made: Touch = importlib.import_module(self.scene_module).Touch(scene, tip)
+        return made
+
+
+def friction_of(model: Model, options: RenderOptions) -> float:
+    """Coulomb's coefficient that a simulator is given: what the options say, else the model, else 1."""
+    usual = float(model.effects.get(SLIP.name, {}).get("mu", 1.0))
+    return usual if options.friction is None else options.friction
 
 
 def graded(mesh: TetMesh, place: np.ndarray, edge_m: float, reach_m: float) -> TetMesh:
@@ -189,10 +240,7 @@ class SimulatorRenderer(Renderer):
     def __init__(self, name: str, model: Model, adapter: type[Adapter], options: RenderOptions) -> None:
         self.name, self.model, self.options = name, model, options
         self.contact = touched_surface(model, options)
-        slip = model.effects.get(SLIP.name, {})
-        usual = float(slip.get("mu", 1.0))
-        friction = usual if options.friction is None else options.friction
-        self.adapter = adapter(model, options, friction)
+        self.adapter = adapter(model, options, friction_of(model, options))
         self._tree = cKDTree(self.contact.arrays.vertices)
 
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> SimulatedState:
@@ -266,6 +314,8 @@ def missing(adapter: type[Adapter], error: ImportError) -> OptionError:
 def made(adapter: type[Adapter], model: Model, options: RenderOptions) -> Any:
     """The renderer of an adapter; raises OptionError where the simulator is not installed."""
     try:
-        return SimulatorRenderer(adapter.name, model, adapter, options)
+        for name in adapter.needs:
+            importlib.import_module(name)
     except ImportError as error:
         raise missing(adapter, error) from error
+    return SimulatorRenderer(adapter.name, model, adapter, options)

@@ -11,6 +11,7 @@ linear tetrahedra lock.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ import numpy as np
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.render.options import BEST, DOCUMENTED
-from palpate.render.simulators.base import SteppedAdapter, SteppedWorld, World, made
+from palpate.render.simulators.base import SteppedAdapter, Touch, made
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -59,43 +60,51 @@ SETTINGS = {
 }
 
 
-def flex_xml(
+def scene_xml(
     mesh: TetMesh,
-    timestep_s: float,
-    *,
-    young_pa: float,
-    poisson: float,
     radius_m: float,
-    friction: float = 0.5,
-    solref: tuple[float, float] = (0.02, 1.0),
-    impedance: tuple[float, float] = (0.9, 0.95),
-    damping_s: float = 0.01,
-    skin_m: float = 1e-4,
-    friction_ratio: float = 1.0,
+    given: Mapping[str, float],
+    own: MujocoSettings,
+    *,
+    start: np.ndarray | None = None,
+    beside: str = "",
 ) -> str:
-    """An object as a flex and a sphere whose centre is the first three of qpos. Its cones of friction are
-    elliptic: the usual pyramids push back the less the greater the friction is, from 1 on, and at 10 not at
-    all."""
+    """An object as a flex, and a sphere whose centre is the first three of qpos, away from `start` (3,) m
+    (None: the origin). given: as `Adapter.stated`. beside: more elements of the file.
+
+    All of the scene but `own.material`, which no file can say. Its cones of friction are elliptic: the usual
+    pyramids push back the less the greater the friction is, from 1 on, and at 10 not at all.
+    """
     points = " ".join(f"{value:.6g}" for value in mesh.points.ravel())
     elements = " ".join(str(node) for node in mesh.tetrahedra.ravel())
     pins = " ".join(str(node) for node in np.flatnonzero(mesh.fixed))
+    at = "" if start is None else f' pos="{" ".join(f"{value:.9g}" for value in start)}"'
+    slides = "\n".join(
+        f'<joint name="tip_{name}" type="slide" axis="{axis}"/>'
+        for name, axis in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), strict=True)
+    )
     mass = DENSITY_KG_M3 * float(mesh.volumes.sum())
-    contact = f'solref="{solref[0]:g} {solref[1]:g}" solimp="{impedance[0]:g} {impedance[1]:g} 0.001"'
+    contact = (
+        f'condim="3" friction="{given["friction"]:g}" solref="{own.solref_s:g} {own.damping_ratio:g}" '
+        f'solimp="{own.impedance:g} {own.impedance_deep:g} 0.001"'
+    )
     return f"""<mujoco>
-<option timestep="{timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG" cone="elliptic"
-impratio="{friction_ratio:g}"/>
+<option timestep="{own.timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG" cone="elliptic"
+impratio="{own.friction_ratio:g}"/>
 <size memory="1G"/>
 <worldbody>
-<body name="tip"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
-<joint type="slide" axis="0 0 1"/>
-<geom type="sphere" size="{radius_m}" mass="{HEAVY_KG:g}" condim="3" friction="{friction:g}"
-{contact}/></body>
-<flexcomp name="object" type="direct" dim="3" mass="{mass}" radius="{skin_m:g}"
+<body name="tip"{at}>
+{slides}
+<geom name="tip" type="sphere" size="{radius_m}" mass="{HEAVY_KG:g}" {contact}/></body>
+<flexcomp name="object" type="direct" dim="3" mass="{mass}" radius="{own.skin_m:g}"
 point="{points}" element="{elements}">
-<contact condim="3" selfcollide="none" friction="{friction:g}" {contact}/>
-<elasticity young="{young_pa}" poisson="{poisson}" damping="{damping_s:g}"/>
+<contact selfcollide="none" {contact}/>
+<elasticity young="{given["young_modulus_pa"]}" poisson="{given["poisson_ratio"]}"
+damping="{own.damping_s:g}"/>
 <pin id="{pins}"/>
-</flexcomp></worldbody></mujoco>"""
+</flexcomp></worldbody>
+{beside}</mujoco>
+"""
 
 
 def force_on_tip(mujoco: Any, model: Any, data: Any) -> np.ndarray:
@@ -114,6 +123,7 @@ class MuJoCo(SteppedAdapter):
     """The adapter."""
 
     name, extra, units = "mujoco", "mujoco", "SI: m, kg, s, N, Pa"
+    needs = ("mujoco",)
     settings = SETTINGS
     poisson_limit = POISSON_LIMIT
     presses = 12
@@ -138,38 +148,30 @@ class MuJoCo(SteppedAdapter):
         "--simulator-settings best",
     }
 
-    def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
+    def scene(self, mesh: TetMesh, radius_m: float) -> Any:
         import mujoco
 
-        super().__init__(model, options, friction)
-        self._mujoco: Any = mujoco
-
-    def scene(self, mesh: TetMesh, radius_m: float) -> Any:
-        given, own = self.stated, self.own
-        xml = flex_xml(
-            mesh, own.timestep_s, young_pa=given["young_modulus_pa"], poisson=given["poisson_ratio"],
-            radius_m=radius_m, friction=self.friction, solref=(own.solref_s, own.damping_ratio),
-            impedance=(own.impedance, own.impedance_deep), damping_s=own.damping_s, skin_m=own.skin_m,
-            friction_ratio=own.friction_ratio,
-        )  # fmt: skip
-        spec = self._mujoco.MjSpec.from_string(xml)
+        spec = mujoco.MjSpec.from_string(scene_xml(mesh, radius_m, self.stated, self.own))
         for flex in spec.flexes:
-            flex.elastic3d = round(own.material) - 1
+            flex.elastic3d = round(self.own.material) - 1
         return spec.compile()
 
-    def touch(self, scene: Any, tip: np.ndarray) -> World:
-        return _MujocoTouch(self._mujoco, scene, tip)
+    def touch(self, scene: Any, tip: np.ndarray) -> Touch:
+        return _MujocoTouch(scene)
 
 
-class _MujocoTouch(SteppedWorld):
+class _MujocoTouch:
     """One touch."""
 
-    def __init__(self, mujoco: Any, model: Any, tip: np.ndarray) -> None:
-        super().__init__(tip, float(model.opt.timestep))
-        self._mujoco, self._model, self._data = mujoco, model, mujoco.MjData(model)
+    def __init__(self, model: Any) -> None:
+        import mujoco
+
+        self._mujoco: Any = mujoco
+        self._model, self._data = model, mujoco.MjData(model)
+        self.timestep_s = float(model.opt.timestep)
 
     def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:
-        self._data.qpos[:3], self._data.qvel[:3] = tip - velocity * self._timestep_s, velocity
+        self._data.qpos[:3], self._data.qvel[:3] = tip - velocity * self.timestep_s, velocity
         self._mujoco.mj_step(self._model, self._data)
 
     def force(self) -> np.ndarray:

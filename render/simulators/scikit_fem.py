@@ -57,6 +57,7 @@ class ScikitFem(Adapter):
     """The adapter. One mesh is factorised for all touches; of `best` one a touch."""
 
     name, extra, units = "scikit-fem", "scikit-fem", "SI: m, N, Pa"
+    needs = ("skfem",)
     cannot = (
         "small strain only",
         "no contact of its own: a sphere on nodes by a penalty is written here",
@@ -73,8 +74,6 @@ class ScikitFem(Adapter):
     settings = SETTINGS
 
     def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
-        import skfem  # noqa: F401
-
         super().__init__(model, options, friction)
         graded = math.isfinite(self.own.edge_radii)
         self.presses = 12 if graded else None

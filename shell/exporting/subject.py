@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from palpate.mechanics.frames import tangents
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.shape.nearest import closest
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.render.simulators.base import graded
+from palpate.render.options import BEST, RenderOptions
+from palpate.render.simulators.base import MOST_FRICTION, NEAR_M, Adapter, friction_of
 
-USUAL_FRICTION = 0.5
+A = TypeVar("A", bound=Adapter)
 DENSITY_KG_M3 = 1000.0
 """Of soft tissue and silicone; a model states none, and a quasi-static press does not ask."""
 
@@ -51,20 +52,37 @@ class Subject:
 
     @property
     def friction(self) -> float:
-        """Coulomb's coefficient: the model's, else a usual one."""
-        mu = self.model.effects.get(SLIP.name, {}).get("mu")
-        return USUAL_FRICTION if mu is None or not math.isfinite(mu) else float(mu)
+        """Coulomb's coefficient as other simulators are given it by `palpate replay --renderer`."""
+        return min(friction_of(self.model, RenderOptions()), MOST_FRICTION)
 
     @property
     def friction_note(self) -> str:
         """Where the friction comes from, in words."""
-        own = self.friction != USUAL_FRICTION
+        own = "mu" in self.model.effects.get(SLIP.name, {})
         return f"friction {self.friction:g}, " + ("of the model" if own else "as the model names none")
 
-    def graded(self, edge_radii: float = 0.5) -> TetMesh:
-        """The linear mesh with edges of at most so many of the tip's radii under it, where the model's are
-        longer."""
-        return graded(self.mesh.linear(), self.top, edge_radii * self.radius_m, 1.2 * self.radius_m)
+    def as_run(self, kind: type[A], numbers: str = "") -> A:
+        """The adapter that `palpate replay --renderer` runs at its best settings; numbers: those changed
+        (`--simulator-set`)."""
+        options = RenderOptions(simulator_settings=BEST, simulator_set=numbers)
+        return kind(self.model, options, friction_of(self.model, options))
+
+    def run_notes(self, kind: type[Adapter], numbers: str = "") -> tuple[str, ...]:
+        """Of such a scene: how it is run here, and what of the model it does not hold, a line each."""
+        run = f"--renderer {kind.name} --simulator-settings {BEST}"
+        run += f" --simulator-set {numbers}" if numbers else ""
+        notes = [
+            f"what palpate replay {run} runs",
+            "linear tetrahedra, which come out stiffer than the model near nu = 0.5",
+            self.friction_note,
+        ]
+        if self.model.material.poisson_ratio > kind.poisson_limit:
+            notes.append(
+                f"Poisson's ratio is {kind.poisson_limit:g} there, beyond which it does not converge"
+            )
+        if np.ptp(self.model.element_ratio) > 1e-9:
+            notes.append("one modulus: the material's own, without what differs from it")
+        return tuple(notes)
 
     @property
     def radius_m(self) -> float:
@@ -75,6 +93,11 @@ class Subject:
     def start(self) -> np.ndarray:
         """(3,) m, the tip's centre a millimetre (or a fifth of its radius) above first touch."""
         return self.top + (self.radius_m + min(1e-3, 0.2 * self.radius_m)) * self.normal
+
+    @property
+    def near(self) -> np.ndarray:
+        """(3,) m, as `start`, as near as `palpate replay` begins another simulator's scene."""
+        return self.top + (self.radius_m + min(0.8 * NEAR_M, 0.2 * self.radius_m)) * self.normal
 
     @property
     def pressed(self) -> np.ndarray:

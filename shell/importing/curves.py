@@ -23,6 +23,8 @@ from palpate.importing.curve_meaning import (
     signs_of,
     unclear_signs,
 )
+from palpate.importing.formats.registry import SHEET_SUFFIXES
+from palpate.importing.formats.sheets import lines_of
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import (
     MOST_ODDS,
@@ -31,7 +33,6 @@ from palpate.importing.meaning import (
     joined,
     settled_clock,
 )
-from palpate.importing.sheets import SHEET_SUFFIXES, lines_of
 from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import SI, without_unit
 from palpate.mechanics.bounds import LARGEST_N

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from palpate.importing.formats.registry import TEXT_SUFFIXES
 from palpate.importing.machine_tests import is_chiaro, kind_of
 from palpate.importing.mapping import Said, find_columns
 from palpate.importing.meaning import Unclear
-from palpate.importing.tables import TEXT_SUFFIXES, read_tables
+from palpate.importing.tables import read_tables
 from palpate.mechanics.disk.reading import no_file
 from palpate.mechanics.disk.surface_files import is_surface_file
 from palpate.mechanics.errors import RecordingError

@@ -17,9 +17,9 @@ from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.result import MachineTests
 from palpate.importing.curve_meaning import SaidOfCurves
 from palpate.importing.curves import LEAST_ROWS, numbers_in, read_curves, stated_radius
+from palpate.importing.formats.registry import SHEET_SUFFIXES, TEXT_SUFFIXES
 from palpate.importing.meaning import MOST_ODDS, Unclear
-from palpate.importing.sheets import SHEET_SUFFIXES
-from palpate.importing.tables import TEXT_SUFFIXES, read_tables
+from palpate.importing.tables import read_tables
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.reconstruction.machine_curves.indentation import read_chiaro
 from palpate.reconstruction.machine_curves.uniaxial import of_compression, read_tension

@@ -1,4 +1,4 @@
-"""Tables of numbers, whatever file they come from; each format is one small reader."""
+"""Tables of numbers, whatever file they come from (`formats`: one file each), and what the readers share."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.importing.formats.registry import by_suffix
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.errors import RecordingError
 
@@ -28,24 +29,6 @@ class Table:
         return len(next(iter(self.columns.values()), ()))
 
 
-_HOME = "palpate.importing"
-TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
-_READERS: dict[str, tuple[str, str]] = {
-    **dict.fromkeys((*TEXT_SUFFIXES, ".gz"), (f"{_HOME}.text", "")),
-    **dict.fromkeys((".xlsx", ".xlsm", ".xls", ".xlsb", ".ods"), (f"{_HOME}.sheets", "python-calamine")),
-    ".npz": (f"{_HOME}.arrays:npz", ""),
-    ".npy": (f"{_HOME}.arrays:npy", ""),
-    ".mat": (f"{_HOME}.arrays:matlab", "h5py"),
-    **dict.fromkeys((".h5", ".hdf5", ".hdf"), (f"{_HOME}.arrays:hdf5", "h5py")),
-    ".parquet": (f"{_HOME}.arrays:parquet", "pyarrow"),
-    ".bag": (f"{_HOME}.ros_bags:bag", "rosbags"),
-    ".db3": (f"{_HOME}.ros_bags:bag", "rosbags"),
-    ".mcap": (f"{_HOME}.ros_bags:mcap", "mcap, rosbags"),
-}
-"""Suffix -> reader, and the libraries that it needs beyond the program's own."""
-SUFFIXES = tuple(_READERS)
-
-
 def read_tables(path: Path | str) -> list[Table]:
     """Every table of a file, or of a ROS 2 bag's folder.
 
@@ -55,15 +38,14 @@ def read_tables(path: Path | str) -> list[Table]:
     path = Path(path)
     if not path.exists():
         raise RecordingError(f"'{path}' {no_file(path)}: name a file that is there")
-    suffix = ".bag" if path.is_dir() else path.suffix.lower()
-    if suffix not in _READERS:
-        allowed = ", ".join(s.removeprefix(".") for s in SUFFIXES)
+    suffix, known = ".bag" if path.is_dir() else path.suffix.lower(), by_suffix()
+    if suffix not in known:
+        allowed = ", ".join(s.removeprefix(".") for s in known)
         raise RecordingError(
             f"'{path}' is of no kind that can be read: allowed are {allowed}, a ROS 2 bag's folder"
         )
-    home, libraries = _READERS[suffix]
-    module, _, function = home.partition(":")
-    reader: Callable[[Path], list[Table]] = getattr(import_module(module), function or "read")
+    module, _, needs = known[suffix]
+    reader: Callable[[Path], list[Table]] = import_module(module).read
     try:
         with bounded_memory(path, RecordingError):
             tables = [t for t in map(_numbers, reader(path)) if t.columns and t.rows > 1]
@@ -71,7 +53,7 @@ def read_tables(path: Path | str) -> list[Table]:
         raise
     except ModuleNotFoundError as error:
         raise RecordingError(
-            f"'{path}' needs {libraries}, and {error.name} is not installed: pip install 'palpate[import]'"
+            f"'{path}' needs {needs}, and {error.name} is not installed: pip install 'palpate[import]'"
         ) from error
     except Exception as error:  # each library has errors of its own for a damaged file
         reason = " ".join(str(error).split())[:200] or type(error).__name__
@@ -85,6 +67,26 @@ def _numbers(table: Table) -> Table:
     """Without columns that hold no finite number."""
     kept = {name: np.asarray(v, dtype=float) for name, v in table.columns.items()}
     return Table(table.name, {name: v for name, v in kept.items() if np.isfinite(v).any()})
+
+
+def by_length(name: str, held: Mapping[str, np.ndarray]) -> list[Table]:
+    """A table for each length: (n,) arrays, and the columns of (n, k) or (k, n) with k up to 16."""
+    tables: dict[int, dict[str, np.ndarray]] = {}
+    for key, value in held.items():
+        value = np.asarray(value)
+        if value.dtype.kind == "M":
+            value = (value - value[0]).astype("timedelta64[ns]").astype(float) * 1e-9
+        if value.dtype.kind not in "fiub" or value.ndim not in (1, 2) or not value.size:
+            continue
+        value = value[:, None] if value.ndim == 1 else value
+        value = value.T if value.shape[0] < value.shape[1] else value
+        if value.shape[1] > 16:
+            continue
+        wide = value.shape[1] > 1
+        own = tables.setdefault(len(value), {})
+        own.update({f"{key}[{k}]" if wide else key: value[:, k].astype(float) for k in range(value.shape[1])})
+    many = len(tables) > 1
+    return [Table(f"{name}:{n}" if many else name, columns) for n, columns in tables.items()]
 
 
 def flattened(name: str, value: Any) -> dict[str, float]:

@@ -18,7 +18,7 @@ from palpate.mechanics.kernel_cache import ROOMS, sources
 from ..conftest import REPOSITORY, modules_of
 
 ROOM_FOLDERS = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "shell")
-EXTRAS = {"palpate.render.simulators.drake", "palpate.render.simulators.newton"}
+EXTRAS = {"palpate.render.simulators.drake_scene", "palpate.render.simulators.newton_scene"}
 """Modules that need a library which the tests do without."""
 
 

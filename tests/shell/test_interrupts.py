@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from palpate.importing.tables import SUFFIXES
+from palpate.importing.formats.registry import by_suffix
 from palpate.operations._run import parser_of
 
 from ..support import interrupts
@@ -19,7 +19,7 @@ def test_every_command_that_is_interrupted_is_one_that_works_on_files_that_are_t
     parser_of(argv[0]).parse_args(argv[1:])
     inputs = [Path(word) for word in argv[1:] if "recordings" in word]
     assert all(file.is_file() for file in inputs)
-    assert argv[0] != "import" or inputs[0].suffix in SUFFIXES
+    assert argv[0] != "import" or inputs[0].suffix in by_suffix()
 
 
 @pytest.fixture

@@ -15,13 +15,11 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import closest, distance, sample
 from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
 from palpate.reconstruction.steps.s4_surface import Surface
-from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
-from palpate.reconstruction.steps.s5_mesh.voxels import voxel_surface
+from palpate.reconstruction.steps.s5_mesh.registry import AUTO, MESHERS, prepared
 
 _SAMPLES = 4000
 _TRIES = 3
 _LOST = 0.02  # of the volume, what may be left out because nothing holds it
-_PITCH = 0.8  # of sigma, a voxel: corners are cut by as much, and the mesh keeps to it within 0.4
 _TRIALS = 40
 _SWEEPS = 40
 _REACH = 0.3  # of the longest edge at the node
@@ -38,9 +36,9 @@ class MeshingOptions:
     )
     radius_edge_ratio: float = option(2.0, "bound rho on circumradius over shortest edge")
     mesh_source: str = option(
-        "auto",
+        AUTO,
         "what is meshed: the surface, or its voxels; auto: voxels in the paper's mode, else the surface",
-        choices=("auto", "surface", "voxels"),
+        choices=(AUTO, *MESHERS),
     )
 
 
@@ -84,24 +82,17 @@ def fill(surface: Surface, options: MeshingOptions | None = None, progress: Prog
     if not options.mesh_size_m > 0:
         raise MeshError(f"--mesh-size is {options.mesh_size_m} m; it must be greater than 0")
     progress("meshing", 0.0)
-    up, origin = surface.support_normal, surface.support_point
-    sigma = options.surface_distance_m
-    lowest = float(((surface.vertices - origin) @ up).min())
-    if abs(lowest) > 0.1 * sigma:
+    lowest = float(((surface.vertices - surface.support_point) @ surface.support_normal).min())
+    if abs(lowest) > 0.1 * options.surface_distance_m:
         raise MeshError(f"the surface ends {1e3 * lowest:.2f} mm above the support; it must stand on it")
-    vertices, triangles = _input(surface, options)
-    voxels = options.mesh_source == "voxels"
-    # the envelope keeps volume and edges; voxels are rough, and a wider one smooths that away
-    envelope = 0.4 * sigma if voxels else min(0.15 * sigma, 0.03 * options.mesh_size_m)
+    mesher = prepared(surface, options)
     made: list[tuple[float, TetMesh]] = []
     for rest in reversed(range(_TRIES)):
         progress("meshing", 0.8 * (1 - (rest + 1) / _TRIES))
-        points, cells = tetrahedralize(
-            vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope, simplify=voxels
-        )
+        points, cells = mesher.fill()
         # a tetrahedron may be flattened, or beyond what relaxing mends; the mesher's next mesh is another
         try:
-            mesh = _standing(points, cells, surface, envelope, options.radius_edge_ratio)
+            mesh = _standing(points, cells, surface, mesher.envelope_m, options.radius_edge_ratio)
         except MeshError:
             if not rest and not made:
                 raise
@@ -129,19 +120,6 @@ def _standing(
     on_surface[_boundary(cells)] = True
     points = relaxed(points, cells, ratio, on_surface=on_surface, fixed=fixed, up=up, limit_m=envelope)
     return TetMesh(points, cells, fixed, on_surface & ~fixed, surface.shape)
-
-
-def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.ndarray]:
-    """What the mesher is given, device frame: a drawing no finer than the tetrahedra need, or the voxels'
-    surface."""
-    frame = surface.frame
-    if options.mesh_source == "voxels":
-        flat = (surface.vertices - surface.support_point) @ frame.T
-        vertices, triangles = voxel_surface(flat, surface.triangles, _PITCH * options.surface_distance_m)
-        return vertices @ frame + surface.support_point, triangles
-    if surface.redraw is None:
-        return surface.vertices, surface.triangles
-    return surface.redraw(options.mesh_size_m)
 
 
 def _boundary(cells: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import json
 import re
@@ -16,12 +17,20 @@ import trimesh
 
 import palpate as pp
 from palpate import cli
+from palpate.exporting.mujoco import FILE_SETTINGS
 from palpate.mechanics.disk.surface_files import read_surface
 from palpate.mechanics.model.files import write_model
 from palpate.mechanics.model.material import Ball, Material
 from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.progress import silent
 from palpate.mechanics.shape.tetmesh import box_mesh
+from palpate.render.options import BEST, RenderOptions
+from palpate.render.registry import create
+from palpate.render.replay import replay
+from palpate.render.simulators.base import NEAR_M
+from palpate.render.simulators.drake import Drake
 from palpate.render.simulators.mujoco import force_on_tip
+from palpate.render.simulators.newton import Newton
 
 SIZE = (0.06, 0.05, 0.03)
 MATERIAL = ("youngsModulus", "poissonsRatio", "density", "dynamicFriction")
@@ -133,12 +142,59 @@ def test_newton_imports_the_stage_with_modulus_and_held_base(stage):
     assert any(len(getattr(builder, name)) == linear.fixed.sum() for name in held)
 
 
-@pytest.mark.parametrize("to", ["newton", "drake"])
-def test_scripts_are_whole(tmp_path, to):
-    pp.export(block(nu=0.4), to, tmp_path / "m.py", progress=False)
+def replayed(model: Model, name: str, place, depth: float, dt_s: float, numbers: str = ""):
+    """(tips (n, 3) m, forces (n, 3) N) of `palpate replay --renderer`: straight down at a place of a level
+    top from where an exported scene begins, then aside."""
+    place, up = np.array(place), np.array([0.0, 0.0, 1.0])
+    t = dt_s * np.arange(14)
+    down = np.interp(t, [0, 8 * dt_s], [-0.8 * NEAR_M, depth])
+    aside = np.interp(t, [10 * dt_s, 13 * dt_s], [0.0, 2e-4])
+    tips = place + (model.tool.tip_radius_m - down[:, None]) * up + aside[:, None] * [1.0, 0.0, 0.0]
+    options = RenderOptions(simulator_settings=BEST, simulator_set=numbers)
+    return tips, replay(create(name, model, options), t, tips, progress=silent)
+
+
+@pytest.mark.parametrize(("to", "kind"), [("newton", Newton), ("drake", Drake)])
+def test_a_script_holds_the_scene_that_is_run(tmp_path, to, kind):
+    """Its numbers are those that the renderer gives to the same file."""
+    model = block(nu=0.4, cells=(4, 4, 3)).replaced(effects={"friction_slip": {"mu": np.inf}})
+    pp.export(model, to, tmp_path / "m.py", at=(0, 0, 0.03), progress=False)
     text = (tmp_path / "m.py").read_text()
-    compile(text, "m.py", "exec")
     assert text.startswith("# Palpate model") and "$" not in text
+    body = ast.parse(text).body
+    made = next(n for n in body if isinstance(n, ast.Assign) and ast.unparse(n.value).startswith("Scene("))
+    found = {k.arg: eval(ast.unparse(k.value), {"np": np, "inf": np.inf}) for k in made.value.keywords}
+    run = kind(model, RenderOptions(simulator_settings=BEST), np.inf)
+    radius = model.tool.tip_radius_m
+    given = run.given(run.mesh_under(np.array([0, 0, 0.03 + radius + 0.8 * NEAR_M]), radius), radius)
+    assert found.keys() == given.keys() and len(given["points"]) > len(model.mesh.linear().points)
+    assert all(np.array_equal(found[key], value) for key, value in given.items())
+    scene = next(n for n in body if isinstance(n, ast.ClassDef) and n.name == "Scene")
+    assert {a.arg for a in scene.body[1].args.args + scene.body[1].args.kwonlyargs} == {"self", *given}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("to", "needs"), [("newton", "newton"), ("drake", "pydrake")])
+def test_a_script_gives_the_force_that_is_replayed(tmp_path, to, needs):
+    """Its path is led along by the test: everything before it is the script's."""
+    pytest.importorskip(needs)
+    model = block(nu=0.4, ball=False, cells=(4, 4, 3))
+    pp.export(model, to, tmp_path / "m.py", at=(0, 0, 0.03), progress=False)
+    built, path = (tmp_path / "m.py").read_text().split("last = START")[0], tmp_path / "led.py"
+    tips, ours = replayed(model, to, (0, 0, 0.03), 1e-3, 2e-3)
+    path.write_text(
+        f"{built}\ntips, counts = np.array({tips.tolist()}), [1] + 13 * [2]\nlast = tips[0]\n"
+        "for tip, count in zip(tips, counts):\n"
+        "    way = (tip - last) / count\n"
+        "    for _ in range(count):\n"
+        "        last = last + way\n"
+        "        touch.advance(last, way / scene.timestep_s)\n"
+        "    print('force', *touch.force().tolist())\n"
+    )
+    said = subprocess.run([sys.executable, path], capture_output=True, text=True, check=True).stdout
+    theirs = np.array([line.split()[1:] for line in said.splitlines() if line[:5] == "force"], dtype=float)
+    assert np.abs(ours).max() > 0.01
+    assert np.abs(theirs - ours).max() < 1e-6 * np.abs(ours).max()
 
 
 @pytest.mark.slow
@@ -180,6 +236,45 @@ def flex_forces(path, aside_m: float = 0.0) -> np.ndarray:
             mujoco.mj_step(model, data)
         found.append(force_on_tip(mujoco, model, data))
     return np.array(found)
+
+
+def test_mujocos_file_gives_the_force_that_is_replayed(tmp_path):
+    """The file, loaded and stepped by MuJoCo alone with its tip led by hand, against the renderer on the same
+    path: down and aside, with a Poisson's ratio that a flex does not bear, a friction that never slips and a
+    lump that neither holds."""
+    mujoco = pytest.importorskip("mujoco")
+    model = block(nu=0.49, order=1, cells=(4, 4, 3)).replaced(effects={"friction_slip": {"mu": np.inf}})
+    with contextlib.chdir(tmp_path):
+        notes = pp.export(model, "mujoco", tmp_path / "m.xml", at=(0, 0, 0.03), progress=False)
+        tips, ours = replayed(model, "mujoco", (0, 0, 0.03), 1e-3, 2e-3, FILE_SETTINGS)
+        scene = mujoco.MjModel.from_xml_path(str(tmp_path / "m.xml"))
+        scene.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+        data, theirs = mujoco.MjData(scene), []
+        mujoco.mj_forward(scene, data)
+        start = data.body("tip").xpos.copy()
+        assert start == pytest.approx(tips[0], abs=1e-9)
+        last, wrench = tips[0], np.zeros(6)
+        for tip, count in zip(tips, [1] + 13 * [2], strict=True):  # replay's first sample is 1 ms long
+            way = (tip - last) / count
+            for _ in range(count):
+                data.qpos[:3], data.qvel[:3] = last - start, way / scene.opt.timestep
+                mujoco.mj_step(scene, data)
+                last = last + way
+            force = np.zeros(3)
+            for k in range(data.ncon):
+                mujoco.mj_contactForce(scene, data, k, wrench)
+                sign = -1.0 if data.contact[k].geom[0] >= 0 else 1.0
+                force += sign * (data.contact[k].frame.reshape(3, 3).T @ wrench[:3])
+            theirs.append(force)
+    assert ours[-1][2] > 0.01 and ours[-1][0] < -1e-3
+    assert np.abs(np.array(theirs) - ours).max() < 1e-6 * np.abs(ours).max()
+    for part in (
+        f"--simulator-set {FILE_SETTINGS}",
+        "ratio is 0.45",
+        "friction 10, of the model",
+        "one modulus",
+    ):
+        assert any(part in note for note in notes)
 
 
 @pytest.mark.slow

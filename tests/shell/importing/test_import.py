@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 import palpate as pp
 from palpate import cli
 from palpate.importing.clocks import cross_correlated
-from palpate.importing.text import seconds_of
+from palpate.importing.formats.text import seconds_of
 from palpate.mechanics.errors import FileError, OptionError, RecordingError
 
 RATE, TIP = 500.0, 0.004

@@ -6,10 +6,8 @@ import datetime
 from pathlib import Path
 from typing import Any
 
+from palpate.importing.formats.text import table_of
 from palpate.importing.tables import Table
-from palpate.importing.text import table_of
-
-SHEET_SUFFIXES = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")
 
 
 def read(path: Path) -> list[Table]:
