@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from palpate.mechanics.elastic.solver import partial_factor
+from palpate.mechanics.elastic.partial_factor import partial_factor
 from palpate.mechanics.press_solver.graded_mesh import GradedMesh
 from palpate.mechanics.press_solver.solid import Response, SolidElements
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.mechanics.elastic.solver import partial_factor
+from palpate.mechanics.elastic.partial_factor import partial_factor
 from palpate.scenes.laboratory.contact import Grip, SphereContact
 from palpate.scenes.laboratory.solid import Solid
 from palpate.scenes.laboratory.solver import LabError

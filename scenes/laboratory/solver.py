@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.mechanics.elastic.solver import partial_factor
+from palpate.mechanics.elastic.partial_factor import partial_factor
 from palpate.mechanics.errors import PalpateError
 from palpate.scenes.laboratory.contact import Grip, SphereContact
 from palpate.scenes.laboratory.solid import History, Solid

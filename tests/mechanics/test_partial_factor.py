@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from palpate.mechanics.elastic.solver import SuperLuFactor, partial_factor
+from palpate.mechanics.elastic.partial_factor import SuperLuFactor, partial_factor
 
 
 def test_both_factorisations_condense_alike():
