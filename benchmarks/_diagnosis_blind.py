@@ -1,4 +1,4 @@
-"""A case as tasks of a graph: its object's touches solved (shared between cases), sealed recording and model,
+"""A case as tasks: its object's touches solved (shared between cases), sealed recording and model,
 verdict. Everything lies in one work folder, which all workers must see; then the truth is opened.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 from benchmarks._diagnosis_cases import FINITE, Case
 from palpate.mechanics.disk.writing import atomic_file
 from palpate.mechanics.errors import PalpateError
-from palpate.parallel.graph import Task, finished
+from palpate.parallel.tasks import Task, finished
 from palpate.scenes.laboratory.specimen import VERSION
 
 _HERE = "benchmarks._diagnosis_blind"

@@ -3,8 +3,7 @@
 cost: CPU seconds and memory of every step, measured by the batch itself, and what 10,000 recordings need,
 computed from that. workers: the same recordings with 1 and with 2 processes of one thread (the limit is 2),
 in turns, on this machine and as Dask workers; before each pair the load that others make is told. tasks:
-graphs of the same shape whose tasks do nothing, 10^4 and 10^5 of them, on two workers:
-the engines' own limit.
+the same needs between tasks that do nothing, 10^4 and 10^5 of them, on two workers: the engines' own limit.
 """
 
 from __future__ import annotations
@@ -32,10 +31,10 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.progress import Progress
 from palpate.mechanics.recording.files import recording_files
 from palpate.output import progress_bar
-from palpate.parallel.driver import Status
-from palpate.parallel.driver import run as run_graph
-from palpate.parallel.engine import executor
-from palpate.parallel.graph import Graph, Task
+from palpate.parallel.engines import engine as chosen_engine
+from palpate.parallel.run import Status
+from palpate.parallel.run import run as run_tasks
+from palpate.parallel.tasks import Task
 
 _MANY = 10_000
 
@@ -176,7 +175,7 @@ def nothing(number: int) -> int:
     return number
 
 
-def empty_graph(count: int, root: Path) -> Graph:
+def empty_tasks(count: int, root: Path) -> list[Task]:
     """Tasks that do nothing, in the shape of a batch: two that need one, for every recording."""
     made: list[Task] = []
     for k in range(count):
@@ -190,11 +189,11 @@ def empty_graph(count: int, root: Path) -> Graph:
                 stage=("reconstruct", "compare", "diagnose")[k % 3],
             )
         )
-    return Graph(made)
+    return made
 
 
 def _told(bar: Progress, status: Status) -> None:
-    bar("tasks", status.ended.total() / status.total.total())
+    bar("tasks", status.fraction)
 
 
 def tasks(counts: Sequence[int], place: Path, engines: Sequence[str]) -> dict[str, Any]:
@@ -206,18 +205,18 @@ def tasks(counts: Sequence[int], place: Path, engines: Sequence[str]) -> dict[st
             root = place / f"tasks-{engine}-{count}"
             root.mkdir()
             began = time.perf_counter()
-            graph = empty_graph(count, root)
+            todo = empty_tasks(count, root)
             planned = time.perf_counter() - began
             with (
                 dask_workers(2) if engine == "dask" else contextlib.nullcontext() as address,
-                executor(None if address else 2, address) as chosen,
+                chosen_engine(None if address else 2, address) as chosen,
                 progress_bar(f"{engine}, {count} tasks") as bar,
             ):
                 began, cpu = time.perf_counter(), time.process_time()
-                outcomes = run_graph(graph, chosen, root, tell=partial(_told, bar))
+                outcomes = run_tasks(todo, chosen, root, tell=partial(_told, bar))
                 spent, own = time.perf_counter() - began, time.process_time() - cpu
                 began = time.perf_counter()
-                again = run_graph(graph, chosen, root)
+                again = run_tasks(todo, chosen, root)
                 found = time.perf_counter() - began
             assert len(outcomes) == count and all(o.state == "done" for o in outcomes.values())
             assert all(o.reused for o in again.values())

@@ -22,7 +22,7 @@ from palpate.mechanics.elastic.pardiso import Pardiso, available
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
-from palpate.parallel.worker import high_water_bytes
+from palpate.parallel.tasks import high_water_bytes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,7 +1,7 @@
 """The blind benchmark: sealed recordings of the virtual laboratory, verdicts first, truths opened after.
 
 Sizes: quick (for CI), protocol (what presses alone hide, explored in two ways), medium, full. Everything that
-is no question is drawn by each case's seed (benchmarks.varied). A graph of tasks, done by processes here or
+is no question is drawn by each case's seed (benchmarks.varied). Tasks, done by processes here or
 by a Dask cluster: touches are solved once an object, every case is simulated with its truth sealed and
 reconstructed, then diagnosed, and its verdict written to the work folder, before the truth is opened; a run
 that was interrupted goes on where it stopped. Rates carry Wilson's 95 % intervals. Baselines on the same
@@ -27,9 +27,8 @@ from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
 from palpate.mechanics.errors import OptionError
 from palpate.operations._to_argparse import finite
-from palpate.parallel.driver import Outcome
-from palpate.parallel.engine import run_with_bar
-from palpate.parallel.graph import Graph, Task
+from palpate.parallel.run import Outcome, run_with_bar
+from palpate.parallel.tasks import Task
 
 
 def _add_engine(parser: argparse.ArgumentParser) -> None:
@@ -175,7 +174,7 @@ def _work_through(
     memory = None if arguments.memory is None else int(1e9 * arguments.memory)
     try:
         run_with_bar(
-            Graph(tasks), work.resolve(), workers=arguments.workers, scheduler=arguments.scheduler,
+            tasks, work.resolve(), workers=arguments.workers, scheduler=arguments.scheduler,
             memory_bytes=memory, force=arguments.force, progress=look, outcomes=outcomes,
         )  # fmt: skip
     except _Late:

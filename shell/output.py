@@ -63,19 +63,16 @@ def plain(value: Any) -> Any:
 _REDRAWN_S, _SHORT_S = 1.0, 5.0
 
 
-def progress_bar(label: str, *, left: bool = True) -> Bar:
-    """A `mechanics.progress.Progress` on standard error; call `.close()`, or use it as a context manager.
-
-    left: False where the stage's own words say what is left.
-    """
-    return Bar(label, left)
+def progress_bar(label: str) -> Bar:
+    """A `mechanics.progress.Progress` on standard error; call `.close()`, or use it as a context manager."""
+    return Bar(label)
 
 
 class Bar:
     """The one display of every wait: on a terminal a bar with the stage and what is left of it, which goes on
     while a stage tells of nothing; elsewhere nothing, so that standard error holds errors alone."""
 
-    def __init__(self, label: str, left: bool = True) -> None:
+    def __init__(self, label: str) -> None:
         from tqdm import tqdm
 
         terminal = sys.stderr.isatty()
@@ -88,7 +85,7 @@ class Bar:
             leave=True,
         )
         self._terminal, self._label, self._stage, self._share = terminal, label, "", 0.0
-        self._says_left, self._left, self._closed = left, Remaining(), threading.Event()
+        self._left, self._closed = Remaining(), threading.Event()
         self._left.tell(0.0)
         self._thread = threading.Thread(target=self._go_on, name="progress", daemon=True)
         if terminal:
@@ -102,7 +99,7 @@ class Bar:
 
     def _words(self) -> str:
         """Label and stage, and what is left."""
-        late = self._says_left and self._left.elapsed_s > _SHORT_S
+        late = self._left.elapsed_s > _SHORT_S
         about = ": ".join(word for word in (self._label, self._stage) if word)
         return ", ".join(word for word in (about, self._left.words() if late else "") if word)
 

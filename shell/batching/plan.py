@@ -20,9 +20,8 @@ from palpate.mechanics.errors import OptionError, PalpateError, RecordingError
 from palpate.mechanics.progress import Progress
 from palpate.mechanics.recording.files import recording_files
 from palpate.operations._declare import check_options
-from palpate.parallel.driver import Outcome
-from palpate.parallel.engine import run_with_bar
-from palpate.parallel.graph import Graph, Task
+from palpate.parallel.run import Outcome, run_with_bar
+from palpate.parallel.tasks import Task
 
 STEPS = ("reconstruct", "compare", "diagnose")
 MODEL, THUMBNAIL = "model", "thumbnail.png"
@@ -228,7 +227,7 @@ def batch(
 ) -> Batch:
     """Do what is not finished of all recordings; the summary is written when the user stops it, too.
 
-    Raises OptionError for sources that lead to nothing and what `parallel.engine.executor` refuses, FileError
+    Raises OptionError for sources that lead to nothing and what `parallel.engines.engine` refuses, FileError
     for an output that cannot be written or where another batch writes.
     """
     folder = absolute(out)
@@ -254,11 +253,10 @@ def batch(
         agreeing = tuple(agreements(entries))
         return Batch(folder, tuple(entries), agreeing, planned, reused, steps=tuple(choice.steps))
 
-    graph = Graph(task for own in tasks.values() for task in own)
     with sole_writer(folder):
         try:
             run_with_bar(
-                graph,
+                (task for own in tasks.values() for task in own),
                 folder,
                 workers=workers,
                 scheduler=scheduler,

@@ -14,7 +14,7 @@ import numpy as np
 
 from palpate.mechanics.disk.writing import Kind, atomic_file
 from palpate.mechanics.result import Result
-from palpate.parallel.driver import Outcome
+from palpate.parallel.run import Outcome
 
 _Z95 = 1.959964
 

@@ -1,7 +1,7 @@
-"""Work in parts: a graph of tasks with results on disk, done by processes here or by a Dask cluster.
+"""Work in parts: tasks with results on disk, done by processes here or by a Dask cluster.
 
-graph     what is to be done, what it needs, the key of its content; the file that says that it is finished
-worker    a process that does tasks one at a time on one thread, and measures what they take
-driver    which task next: order, memory, retries, what failed with its reason; how far a run is
-local     an executor of processes on this machine; cluster: one of Dask workers; engine: which, by flags
+tasks     what is to be done, the record by which a finished task is recognised, and how one is done
+process   a process of its own for each thread of an executor, with one thread of its libraries
+engines   `concurrent.futures` threads of this machine, or Dask's: both hand tasks to such processes
+run       which task next: order, memory, retries, what failed with its reason; how far a run is
 """

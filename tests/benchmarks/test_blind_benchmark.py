@@ -11,7 +11,6 @@ from benchmarks._diagnosis_blind import tasks_of, unfinished
 from benchmarks._diagnosis_cases import ALIKE, FINITE, HIDDEN, SEEDS, WEIGHT, Case, cases
 from benchmarks._diagnosis_scores import answer_of, discovered, summarise
 from palpate.mechanics.errors import OptionError
-from palpate.parallel.graph import Graph
 
 KNOWN = {"quick": 8, "medium": 250, "full": 640}
 
@@ -51,8 +50,7 @@ def test_touches_of_an_object_are_solved_once_for_all_its_cases(tmp_path: Path) 
     linear = [Case("control", 0, seed) for seed in (1, 2)]
     finite = Case("single", 0, 3, ("time_delay",), {FINITE: 1.0, "time_delay": 1.0})
     tasks = [t for case in (*linear, finite) for t in tasks_of(case, tmp_path, solve=True, fast=False)]
-    graph = Graph({task.name: task for task in tasks}.values())
-    stages = Counter(task.stage for task in graph.tasks.values())
+    stages = Counter(task.stage for task in {task.name: task for task in tasks}.values())
     assert stages == {"solve": 2, "prepare": 3, "judge": 3}
     assert [len(t.needs) for t in tasks if t.stage == "prepare"] == [1, 1, 2]
     assert all(unfinished(task) for task in tasks)

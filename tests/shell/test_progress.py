@@ -11,8 +11,7 @@ import pytest
 from palpate import output
 from palpate.mechanics.progress import Remaining
 from palpate.output import progress_bar
-from palpate.parallel.engine import run_with_bar
-from palpate.parallel.graph import Graph
+from palpate.parallel.run import run_with_bar
 
 from ..support.waiting import eventually
 
@@ -78,13 +77,13 @@ def test_a_terminal_shows_stage_share_and_what_is_left(monkeypatch):
 
 
 def test_a_batch_says_what_is_left_by_the_same_display(monkeypatch, tmp_path):
-    shown: list[tuple[str, bool]] = []
+    shown: list[str] = []
 
     class Seen(output.Bar):
-        def __init__(self, label: str, left: bool = True) -> None:
-            shown.append((label, left))
-            super().__init__(label, left)
+        def __init__(self, label: str) -> None:
+            shown.append(label)
+            super().__init__(label)
 
     monkeypatch.setattr(output, "Bar", Seen)
-    run_with_bar(Graph(()), tmp_path, workers=1)
-    assert shown == [("", False)]
+    run_with_bar((), tmp_path, workers=1)
+    assert shown == [""]

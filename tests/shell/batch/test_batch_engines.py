@@ -23,10 +23,9 @@ import palpate as pp
 from benchmarks._apply_replay import part_of
 from palpate.mechanics.recording.files import recording_files
 from palpate.mechanics.recording.recording import read_recording, write_recording
-from palpate.parallel.cluster import DaskExecutor
-from palpate.parallel.driver import run
-from palpate.parallel.graph import Graph, Task
-from palpate.parallel.local import LocalExecutor
+from palpate.parallel.engines import DaskEngine, LocalEngine
+from palpate.parallel.run import run
+from palpate.parallel.tasks import Task
 from palpate.scenes.embedded import embedded_recording
 
 from ...support.waiting import PATIENCE_S, eventually
@@ -120,9 +119,9 @@ def test_a_killed_worker_and_a_restarted_scheduler_lose_nothing_and_double_nothi
             cluster.start_worker()
 
     trouble = threading.Thread(target=harm, daemon=True)
-    with DaskExecutor(cluster.address) as executor:
+    with DaskEngine(cluster.address) as engine:
         trouble.start()
-        outcomes = run(Graph(tasks), executor, root)
+        outcomes = run(tasks, engine, root)
     trouble.join(PATIENCE_S)
     assert harm_done == ["worker", "scheduler"]
     assert len(outcomes) == 80 and all(o.state == "done" for o in outcomes.values())
@@ -133,28 +132,26 @@ def test_a_killed_worker_and_a_restarted_scheduler_lose_nothing_and_double_nothi
     done = log.read_text().splitlines()
     assert set(done) == {f"{k}.txt" for k in range(40)}
     assert len(done) <= 40 + 3  # what was under way with the two that died, at most, was done again
-    again = run(Graph(tasks), NoExecutor(), root)
+    again = run(tasks, NoEngine(), root)
     assert all(o.reused for o in again.values())
 
 
-class NoExecutor:
+class NoEngine:
     """Nothing is left to be done."""
 
     memory_bytes = None
 
-    def at_once(self) -> int:
+    def slots(self) -> int:
         return 1
 
-    slots = at_once
-
-    def submit(self, jobs):
-        raise AssertionError(f"{jobs} would be done again")
+    def submit(self, job, order):
+        raise AssertionError(f"{job} would be done again")
 
 
 def test_a_scheduler_that_is_not_there_is_told_in_a_line(monkeypatch):
-    monkeypatch.setattr("palpate.parallel.cluster._CONNECT_S", 1.0)
+    monkeypatch.setattr("palpate.parallel.engines._CONNECT_S", 1.0)
     with pytest.raises(pp.OptionError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
-        DaskExecutor("tcp://127.0.0.1:9")
+        DaskEngine("tcp://127.0.0.1:9")
 
 
 def test_an_error_and_a_crash_on_a_dask_worker_cost_their_task_alone(tmp_path, cluster):
@@ -163,8 +160,8 @@ def test_an_error_and_a_crash_on_a_dask_worker_cost_their_task_alone(tmp_path, c
         Task("errands:die", {"times": 2}, tmp_path / "die", {"path": str(tmp_path / "die.txt")}),
         Task("errands:threads", {}, tmp_path / "threads"),
     ]
-    with DaskExecutor(cluster.address) as executor:
-        found = {Path(n).name: o for n, o in run(Graph(tasks), executor, tmp_path).items()}
+    with DaskEngine(cluster.address) as engine:
+        found = {Path(n).name: o for n, o in run(tasks, engine, tmp_path).items()}
     assert found["fail"].reason == "no presses"
     assert found["die"].reason.startswith("its process was ended by SIGKILL")
     value = found["threads"].record.value
@@ -174,7 +171,7 @@ def test_an_error_and_a_crash_on_a_dask_worker_cost_their_task_alone(tmp_path, c
 
 def test_an_interruption_ends_what_the_cluster_does_for_this_run_and_for_no_other(tmp_path, cluster):
     said = [tmp_path / "ours.txt", tmp_path / "theirs.txt"]
-    runs = [Graph([Task("errands:linger", {}, path.with_suffix(""), {"path": str(path)})]) for path in said]
+    runs = [[Task("errands:linger", {}, path.with_suffix(""), {"path": str(path)})] for path in said]
 
     def processes(path: Path) -> list[int]:
         return list(map(int, path.read_text().split())) if path.exists() else []
@@ -184,7 +181,7 @@ def test_an_interruption_ends_what_the_cluster_does_for_this_run_and_for_no_othe
             raise KeyboardInterrupt
 
     def theirs() -> None:
-        with suppress(KeyboardInterrupt), DaskExecutor(cluster.address) as other:
+        with suppress(KeyboardInterrupt), DaskEngine(cluster.address) as other:
             run(runs[1], other, tmp_path, tell=stop_when_ours_ended)
 
     def stop_when_ours_ended(status) -> None:
@@ -194,8 +191,8 @@ def test_an_interruption_ends_what_the_cluster_does_for_this_run_and_for_no_othe
     ended = threading.Event()
     neighbour = threading.Thread(target=theirs)
     neighbour.start()
-    with pytest.raises(KeyboardInterrupt), DaskExecutor(cluster.address) as executor:
-        run(runs[0], executor, tmp_path, tell=stop_when_both_work)
+    with pytest.raises(KeyboardInterrupt), DaskEngine(cluster.address) as engine:
+        run(runs[0], engine, tmp_path, tell=stop_when_both_work)
     assert eventually(lambda: not any(map(alive, processes(said[0]))))
     assert all(map(alive, processes(said[1])))
     ended.set()
@@ -232,19 +229,19 @@ def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_mode
         result = pp.batch(tmp_path / "in", out, **given, **engine)
         assert [row.status for row in result] == ["failed", "done"]
         assert result.reused >= 1  # the model is that of the first
-        answers[name] = _answers(out / "cylinder", _executor(engine), source)
+        answers[name] = _answers(out / "cylinder", _engine(engine), source)
     assert answers["one"] == answers["two"] == answers["dask"]
     result.show(screenshot=tmp_path / "objects.png")
     assert "cylinder/thumbnail.png" in (tmp_path / "dask" / "index.html").read_text()
 
 
-def _executor(engine):
+def _engine(engine):
     if "scheduler" in engine:
-        return lambda: DaskExecutor(engine["scheduler"])
-    return lambda: LocalExecutor(engine["workers"])
+        return lambda: DaskEngine(engine["scheduler"])
+    return lambda: LocalEngine(engine["workers"])
 
 
-def _answers(folder: Path, executor, recording: Path) -> dict:
+def _answers(folder: Path, engine, recording: Path) -> dict:
     """What does not depend on the clock: the JSON of the steps, and the hash of a replay's forces."""
     replay = Task(
         "errands:replayed",
@@ -252,8 +249,8 @@ def _answers(folder: Path, executor, recording: Path) -> dict:
         folder / "replay",
         {"model": str(folder / "model"), "recording": str(recording)},
     )
-    with executor() as chosen:
-        (outcome,) = run(Graph([replay]), chosen, folder).values()
+    with engine() as chosen:
+        (outcome,) = run([replay], chosen, folder).values()
     found = {step: json.loads((folder / f"{step}.json").read_text()) for step in ("compare", "diagnose")}
     assert found["diagnose"].pop("seconds")
     return {**found, "replay": outcome.record.value}

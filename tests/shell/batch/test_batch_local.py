@@ -12,9 +12,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from palpate.parallel.driver import run
-from palpate.parallel.graph import Graph, Task
-from palpate.parallel.local import LocalExecutor
+from palpate.parallel.engines import LocalEngine
+from palpate.parallel.run import run
+from palpate.parallel.tasks import Task
 
 from ...support.waiting import PATIENCE_S, eventually
 
@@ -38,8 +38,8 @@ def alive(process: int) -> bool:
 @linux
 def test_each_process_has_one_thread_and_prints_disturb_nobody(tmp_path):
     tasks = [Task("errands:threads", {}, tmp_path / str(k)) for k in range(4)]
-    with LocalExecutor(2) as executor:
-        values = [o.record.value for o in run(Graph(tasks), executor, tmp_path).values()]
+    with LocalEngine(2) as engine:
+        values = [o.record.value for o in run(tasks, engine, tmp_path).values()]
     assert {(v["omp"], v["numba"]) for v in values} == {("1", 1)}
     assert all(v["running"] <= 3 for v in values)  # the work, who listens, who watches the memory
     assert 1 <= len({v["process"] for v in values} - {os.getpid()}) <= 2
@@ -50,8 +50,8 @@ def test_a_killed_process_costs_its_task_one_retry_and_nobody_else_anything(tmp_
         Task("errands:die", {"times": times}, tmp_path / f"{times}", {"path": str(tmp_path / f"{times}.txt")})
         for times in (0, 1, 2)
     ]
-    with LocalExecutor(2) as executor:
-        found = [(o.state, o.reason) for o in run(Graph(tasks), executor, tmp_path).values()]
+    with LocalEngine(2) as engine:
+        found = [(o.state, o.reason) for o in run(tasks, engine, tmp_path).values()]
     killed = "its process was ended by SIGKILL (out of memory?)"
     assert sorted(found) == [("done", ""), ("done", ""), ("failed", killed)]
 
@@ -59,8 +59,8 @@ def test_a_killed_process_costs_its_task_one_retry_and_nobody_else_anything(tmp_
 @linux
 def test_memory_of_a_task_is_measured_by_itself(tmp_path):
     tasks = [Task("errands:fill", {"megabytes": m}, tmp_path / str(m)) for m in (150, 1)]
-    with LocalExecutor(1) as executor:
-        found = [o.record.peak_bytes / 1e6 for o in run(Graph(tasks), executor, tmp_path).values()]
+    with LocalEngine(1) as engine:
+        found = [o.record.peak_bytes / 1e6 for o in run(tasks, engine, tmp_path).values()]
     assert 150 < found[0] < 300
     assert found[1] < found[0] - 120  # the same process, after a larger task
 
@@ -74,17 +74,17 @@ def test_nothing_is_left_running(tmp_path, end):
 import signal
 from pathlib import Path
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
-from palpate.parallel.driver import run
-from palpate.parallel.graph import Graph, Task
-from palpate.parallel.local import LocalExecutor
+from palpate.parallel.engines import LocalEngine
+from palpate.parallel.run import run
+from palpate.parallel.tasks import Task
 root = Path({str(tmp_path)!r})
 quick = Task("errands:write", {{"value": 1}}, root / "quick", {{"path": str(root / "quick.txt")}})
 slow = Task("errands:linger", {{}}, root / "slow", {{"path": {str(said)!r}}})
 class Left(Exception): ...
 def tell(status):
     if {end == "left"} and Path({str(seen)!r}).exists(): raise Left
-with LocalExecutor(2) as executor:
-    run(Graph([quick, slow]), executor, root, tell=tell)
+with LocalEngine(2) as engine:
+    run([quick, slow], engine, root, tell=tell)
 """
     parent = subprocess.Popen([sys.executable, "-P", "-c", script], stderr=subprocess.PIPE)
     assert eventually(

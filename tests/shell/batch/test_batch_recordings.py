@@ -72,7 +72,7 @@ def quick(monkeypatch):
 
     for name in steps.STEPS:
         monkeypatch.setattr(steps, name, step(name))
-    monkeypatch.setattr("palpate.parallel.engine.executor", lambda *given: nullcontext(Here(2)))
+    monkeypatch.setattr("palpate.parallel.run.engine", lambda *given: nullcontext(Here(2)))
     return did
 
 
@@ -232,14 +232,14 @@ def test_an_interruption_leaves_a_summary_that_says_what_waits(tmp_path, quick, 
     for name in "abc":
         recording(tmp_path / "in" / f"{name}.csv")
 
-    def stop_at_b(self, timeout_s):
-        if "b" in [Path(name).parents[1].name for name, _ in self.held]:
+    def stop_at_b(self, job, order):
+        if Path(job["record"]).parents[1].name == "b":
             raise KeyboardInterrupt
-        return collect(self, timeout_s)
+        return submit(self, job, order)
 
-    collect = Here.collect
-    monkeypatch.setattr(Here, "collect", stop_at_b)
-    monkeypatch.setattr("palpate.parallel.engine.executor", lambda *given: nullcontext(Here(1)))
+    submit = Here.submit
+    monkeypatch.setattr(Here, "submit", stop_at_b)
+    monkeypatch.setattr("palpate.parallel.run.engine", lambda *given: nullcontext(Here(1)))
     assert cli.main(["batch", str(tmp_path / "in"), "-o", str(tmp_path / "out")]) == 130
     rows = list(csv.DictReader((tmp_path / "out" / "summary.csv").open()))
     assert [row["status"] for row in rows] == ["done", "waiting", "waiting"]
