@@ -14,7 +14,7 @@ from typing import Any
 
 from palpate.mechanics.disk.schema import span
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.mechanics.plausible import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 
 EXACT = "solve each touched place in place of reading the table (some 10 s of processor time a place)"
 """Help of `exact`, wherever it is an option."""

@@ -2,7 +2,7 @@
 
 `Key.unit`, `option(unit=...)` and `Parameter.unit` state units in one spelling: a space multiplies, one slash
 divides, ^ raises, "1" has no dimension, "ln s" is a logarithm. A key's name ends with its unit
-(`work_j_per_m2`). Ranges and defaults that several places share stand here too.
+(`work_j_per_m2`). What is plausible of a quantity stands in `mechanics.plausible`.
 """
 
 from __future__ import annotations
@@ -13,21 +13,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.errors import OptionError
-
-YOUNG_MODULUS = FileKey(low=1.0, high=1e9, unit="Pa", required=True)
-"""From the softest gel to stiff rubber."""
-POISSON_RATIO = FileKey(low=0.0, high=0.4999)
-"""The one range of Poisson's ratio. Below 0 there is no soft solid that a hand explores, and the tables of
-the dent (from 0.10 on for 'linear', from 0.40 on for 'neo-hookean', extended in a straight line) know
-nothing; towards 0.5 the stiffness of the displacement elements grows as 1 / (1 - 2 nu) until no digits are
-left, and 0.5 has none."""
-USUAL_POISSON_RATIO = 0.49
-"""Of silicone and soft tissue, where nothing is stated."""
-TIP_RADIUS = FileKey(low=1e-4, high=0.04, unit="m", required=True)
-"""Of a rigid spherical tip that a hand or a device holds."""
-USUAL_TIP_RADIUS_M = 0.005
 
 
 class Unit(NamedTuple):

@@ -18,8 +18,8 @@ from palpate.mechanics.errors import ContactError, NoBaseError, OptionError
 from palpate.mechanics.model.files import read_model
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
-from palpate.mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.recording.recording import Recording, base_model_of
 from palpate.mechanics.result import Result
 from palpate.reconstruction.checks.finding import Finding, outcome_of

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.contact.edges import nearness
 from palpate.mechanics.own_errors import Bound
-from palpate.mechanics.quantities import USUAL_POISSON_RATIO
+from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.render.base import Renderer
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.surface.felt_surface import felt_surface

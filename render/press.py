@@ -18,7 +18,7 @@ import numpy as np
 from palpate.mechanics.disk.reading import read_text
 from palpate.mechanics.disk.writing import Kind, atomic_file
 from palpate.mechanics.errors import OptionError, RecordingError
-from palpate.mechanics.quantities import TIP_RADIUS
+from palpate.mechanics.plausible import TIP_RADIUS
 from palpate.mechanics.result import Result
 from palpate.render.base import Renderer
 from palpate.render.force_error import error_figures, force_errors

@@ -25,8 +25,8 @@ from palpate.mechanics.errors import FileError, ModelError, PalpateWarning, Scen
 from palpate.mechanics.model.files import MODEL, read_model, write_model
 from palpate.mechanics.model.material import Ball, Material
 from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.plausible import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from palpate.mechanics.recording.files import recording_files
 from palpate.mechanics.recording.recording import read_recording
 from palpate.mechanics.shape.flat_foot import Standing, standing

@@ -16,7 +16,7 @@ from palpate.mechanics.disk.reading import no_file
 from palpate.mechanics.disk.surface_files import SUFFIXES, is_surface_file, read_surface
 from palpate.mechanics.errors import SceneError
 from palpate.mechanics.names import unknown
-from palpate.mechanics.quantities import USUAL_POISSON_RATIO
+from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.mechanics.shape.flat_foot import standing
 
 SPACING_M = 0.0018

@@ -31,7 +31,7 @@ from palpate.mechanics.disk.surface_files import SUFFIXES, is_surface_file
 from palpate.mechanics.errors import OptionError, SceneError
 from palpate.mechanics.model.material import BALL, Ball
 from palpate.mechanics.names import unknown
-from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.mechanics.plausible import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from palpate.scenes.embedded import embedded_names, embedded_recording
 from palpate.scenes.phantoms import PHANTOMS, Region
 

@@ -26,8 +26,8 @@ from palpate.mechanics.errors import (
     ModelError,
     SurfaceError,
 )
+from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.mechanics.progress import Clock
-from palpate.mechanics.quantities import USUAL_POISSON_RATIO
 from palpate.mechanics.recording.recording import Recording, write_recording
 from palpate.mechanics.shape.nearest import distance
 from palpate.reconstruction.steps.s2_base import Boundary

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.plausible import SAMPLE_RATE, TIP_RADIUS
+from palpate.mechanics.recording.files import check_plausible
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import STATED
 from palpate.mechanics.recording.segments import TimeSegment as Stretch
@@ -72,20 +74,15 @@ class Instrument:
 
     def __post_init__(self) -> None:
         """Raises RecordingError for what no recording may state."""
-        from palpate.mechanics.recording.files import SCHEMA
-
-        for table, name in (("tool", "tip_radius_m"), ("recording", "sample_rate_hz")):
-            key, value = SCHEMA[table][name], getattr(self, name)  # type: ignore[index]
-            if not key.takes(value):  # type: ignore[union-attr]
-                raise RecordingError(f"{name} is {value}; it must be {key.words}")  # type: ignore[union-attr]
+        for name, key in (("tip_radius_m", TIP_RADIUS), ("sample_rate_hz", SAMPLE_RATE)):
+            if not key.takes(value := getattr(self, name)):
+                raise RecordingError(f"{name} is {value}; it must be {key.words}")
 
 
 def check_joined(instrument: Instrument, segments: list[Segment], segment: Segment) -> None:
     """Raises RecordingError where a segment makes what no exploration can be."""
-    from palpate.mechanics.recording.sane import check_sane
-
     joined = join(instrument, [*segments, segment])
-    check_sane(joined.t, joined.sample_rate_hz, joined.position, joined.force_on_tool)
+    check_plausible(joined.t, joined.sample_rate_hz, joined.position, joined.force_on_tool)
 
 
 def join(instrument: Instrument, segments: list[Segment]) -> Recording:

@@ -17,7 +17,7 @@ from palpate.mechanics.effects.tip_radius import EFFECT as TIP
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.names import number, pairs
-from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.mechanics.plausible import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 
 _FRICTION = FileKey(low=0.0, high=100.0, unknown=True)
 KEYS: dict[str, FileKey] = {

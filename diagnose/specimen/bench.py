@@ -20,8 +20,9 @@ from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.plausible import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
-from palpate.mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M, parse_unit, unit_of_key
+from palpate.mechanics.quantities import parse_unit, unit_of_key
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.statistics import spread_about_zero
 from palpate.reconstruction.geometry.slab import flat_mesh, half_space_size

@@ -28,8 +28,9 @@ from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.effects.strain_stiffening import EFFECT as STIFFENING
 from palpate.mechanics.effects.viscoelasticity import EFFECT as PRONY
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO, quantity_words
+from palpate.mechanics.quantities import quantity_words
 from palpate.reconstruction.machine_curves.relaxation import held_out_relaxation
 from palpate.reconstruction.machine_curves.uniaxial import (
     CEILING,

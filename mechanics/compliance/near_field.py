@@ -14,8 +14,8 @@ import numpy as np
 from palpate.mechanics.compliance.compression import own_compliance
 from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.plausible import USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 CONTACT_IN_TIP_RADII = 0.44

@@ -18,8 +18,8 @@ from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.frames import local_frames
 from palpate.mechanics.model.material import Ball, with_balls
+from palpate.mechanics.plausible import USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
 from palpate.mechanics.shape.refine import refined_around, refined_near_surface, typical_edge
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 

@@ -29,8 +29,8 @@ from palpate.mechanics.elastic.floor import carried_by_floor
 from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.model.material import Ball, with_balls
+from palpate.mechanics.plausible import USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
 from palpate.mechanics.shape.nearest import closest
 from palpate.mechanics.shape.refine import typical_edge
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals

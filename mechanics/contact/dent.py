@@ -23,7 +23,7 @@ from scipy.interpolate import PchipInterpolator
 
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.kernels import kernel
-from palpate.mechanics.quantities import USUAL_POISSON_RATIO
+from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 
 DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last row holds
 _STEPS = 600

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.patch import usual_width
-from palpate.mechanics.quantities import USUAL_POISSON_RATIO
+from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.mechanics.shape.nearest import distance, triangle_areas
 from palpate.mechanics.shape.tetmesh import TetMesh
 

@@ -9,7 +9,7 @@ from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.quantities import POISSON_RATIO
+from palpate.mechanics.plausible import POISSON_RATIO
 
 
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:

@@ -41,8 +41,8 @@ from palpate.mechanics.model.material import (
     Skin,
 )
 from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.plausible import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from palpate.mechanics.presses.table import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
-from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from palpate.mechanics.recording.segments import KINDS, TimeSegment
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape

@@ -17,7 +17,7 @@ import numpy as np
 from palpate.mechanics.contact.dent import dent_laws
 from palpate.mechanics.disk.schema import FileKey, Schema
 from palpate.mechanics.errors import ModelError
-from palpate.mechanics.quantities import POISSON_RATIO
+from palpate.mechanics.plausible import POISSON_RATIO
 from palpate.mechanics.shape.nearest import distance
 from palpate.mechanics.shape.tetmesh import TetMesh
 

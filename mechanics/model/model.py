@@ -23,9 +23,9 @@ from palpate.mechanics.model.material import (
     with_balls,
     within_limits,
 )
+from palpate.mechanics.plausible import USUAL_TIP_RADIUS_M
 from palpate.mechanics.presses.making import no_presses
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.quantities import USUAL_TIP_RADIUS_M
 from palpate.mechanics.result import Result
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 

@@ -19,7 +19,7 @@ from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
 from palpate.mechanics.disk.toml_text import dump_toml
 from palpate.mechanics.disk.writing import Kind, atomic_file
 from palpate.mechanics.errors import RecordingError
-from palpate.mechanics.quantities import TIP_RADIUS
+from palpate.mechanics.plausible import TIP_RADIUS
 from palpate.mechanics.recording.segments import delayed
 from palpate.mechanics.recording.side_of_play import leads, play
 from palpate.mechanics.result import Result

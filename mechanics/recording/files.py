@@ -11,18 +11,25 @@ from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.bounds import LARGEST_N
 from palpate.mechanics.disk.reading import no_file, reading
 from palpate.mechanics.disk.schema import ANY, FileKey, Listed, Schema
 from palpate.mechanics.disk.surface_files import UNITS
 from palpate.mechanics.disk.writing import Kind
 from palpate.mechanics.errors import RecordingError
-from palpate.mechanics.quantities import POISSON_RATIO, TIP_RADIUS
+from palpate.mechanics.plausible import (
+    EXPLORATION,
+    MOST_SAMPLES,
+    POISSON_RATIO,
+    READ_RATE,
+    SAMPLE_RATE,
+    TIP_RADIUS,
+    TOOL_MASS,
+)
 from palpate.mechanics.recording.segments import STATED
 
 REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
 QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
-MOST_SAMPLES = 10_000_000
-"""Of a recording, also where its clock is filled at the sample rate: 2.7 hours at 1 kHz."""
 _MOST_TEXT, _MOST_UNPACKED = 2 << 30, 200
 """Bytes of samples, and of unpacked ones a packed byte (numbers pack to a fifth)."""
 
@@ -94,17 +101,62 @@ def read_samples(path: Path) -> dict[str, np.ndarray]:
     return dict(zip(wanted, values.T, strict=True))
 
 
+_UNITS = {"micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
+
+
+def check_plausible(t: np.ndarray, rate: float, position: np.ndarray, force: np.ndarray) -> None:
+    """Raises RecordingError for what no exploration of an object of 1 mm to 1 m by hand can be.
+
+    t: (n,) s. rate: stated, Hz. position: (n, 3) m. force: (n, 3) N.
+    """
+    block = min(100, len(t) - 1)
+    read = block / float(np.median(t[block:] - t[:-block]))
+    if not _near(read, rate):
+        units = {"milliseconds": 1e3, "microseconds": 1e6}
+        like = next((unit for unit, scale in units.items() if _near(read * scale, rate)), "")
+        raise RecordingError(
+            f"t steps by {1 / read:.4g}, in seconds {read:.4g} Hz, where sample_rate_hz is {rate:g}: "
+            + (f"these look like {like}; write t in seconds" if like else "state the true rate")
+        )
+    if (t[-1] - t[0]) * max(rate, read) > MOST_SAMPLES:
+        gap = int(np.argmax(np.diff(t)))
+        raise RecordingError(
+            f"the clock runs from {t[0]:.6g} to {t[-1]:.6g} s (longest gap {t[gap + 1] - t[gap]:.4g} s, "
+            f"after data row {gap + 1}): at most {MOST_SAMPLES / rate:.6g} s at {rate:g} Hz; mend the clock "
+            "or cut the recording"
+        )
+    path, extent = EXPLORATION["extent"], float(np.ptp(position, axis=0).max())
+    if extent > path.high:
+        guesses = [u for u, s in _UNITS.items() if path.likely[0] <= extent * s <= path.likely[1]]
+        like = f"these look like {' or '.join(guesses)}; " if guesses else ""
+        raise RecordingError(
+            f"the tip's path is {extent:.4g} m across: {like}x, y, z must be metres, at most "
+            f"{path.high:g} m across"
+        )
+    loud = np.flatnonzero((np.abs(force) > LARGEST_N).any(axis=1))
+    if len(loud):
+        raise RecordingError(
+            f"{len(loud)} samples have a force above {LARGEST_N:g} N (first in data row {loud[0] + 1}): no "
+            "sensor reads that; remove or repair those rows"
+        )
+
+
+def _near(value: float, other: float) -> bool:
+    most = EXPLORATION["rate"].high
+    return other / most < value < other * most
+
+
 SCHEMA: Schema = {
     "recording": {
-        "sample_rate_hz": FileKey(low=60.0, high=1e5, unit="Hz"),
+        "sample_rate_hz": SAMPLE_RATE,
         "force_on": FileKey(str, choices=("tool", "object"), required=True),
         "boundary_phase": FileKey(size=2, unit="s"),
         "quasi_static": FileKey(bool),
-        "read_rate_hz": FileKey(low=1e-3, high=1e5, unit="Hz"),
+        "read_rate_hz": READ_RATE,
     },
     "tool": {
         "tip_radius_m": TIP_RADIUS,
-        "mass_kg": FileKey(low=0.0, high=5.0, unit="kg"),
+        "mass_kg": TOOL_MASS,
         "calibration": FileKey(str),
     },
     "sensor": {

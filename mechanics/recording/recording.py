@@ -24,24 +24,21 @@ from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.disk.toml_text import dump_toml
 from palpate.mechanics.disk.writing import atomic_file, check_target
 from palpate.mechanics.errors import PalpateWarning, RecordingError
-from palpate.mechanics.quantities import POISSON_RATIO
+from palpate.mechanics.plausible import POISSON_RATIO, QUICKEST_HZ, SAMPLE_RATE
 from palpate.mechanics.recording.calibration import Calibration, read_calibration
 from palpate.mechanics.recording.files import (
     QUATERNION_COLUMNS,
     REQUIRED_COLUMNS,
     SAMPLES,
     SCHEMA,
+    check_plausible,
     description_of,
     read_samples,
     recording_files,
     samples_path,
 )
-from palpate.mechanics.recording.sane import check_sane
 from palpate.mechanics.recording.segments import STATED, TimeSegment
 from palpate.mechanics.result import Result
-
-_QUICKEST_HZ = 2e4
-"""No hand's exploration is sampled faster: a slower clock is then no clock in milliseconds."""
 
 
 class NotRead(PalpateWarning):
@@ -211,14 +208,13 @@ def read_recording(path: Path | str) -> Recording:
     rate = about.get("sample_rate_hz")
     if rate is None:
         rate = 1 / float(np.median(np.diff(t))) if len(t) > 1 and (np.diff(t) > 0).all() else 1000.0
-        limits = SCHEMA["recording"]["sample_rate_hz"]  # type: ignore[index]
-        if np.isfinite(t).all() and not limits.takes(rate):  # type: ignore[union-attr]
+        if np.isfinite(t).all() and not SAMPLE_RATE.takes(rate):
             raise RecordingError(
                 f"'{samples}': t steps by {1 / rate:.4g} s, which is {rate:.4g} Hz; it must be "
-                f"{limits.words}"  # type: ignore[union-attr]
+                f"{SAMPLE_RATE.words}"
                 + (
                     ": these look like milliseconds; write t in seconds"
-                    if rate < 60 <= rate * 1e3 <= _QUICKEST_HZ
+                    if rate < SAMPLE_RATE.low <= rate * 1e3 <= QUICKEST_HZ
                     else ""
                 )
             )
@@ -248,7 +244,7 @@ def read_recording(path: Path | str) -> Recording:
                 for s in table.get("segment", ())
             ),
         )
-        check_sane(t, recording.sample_rate_hz, recording.position, force)
+        check_plausible(t, recording.sample_rate_hz, recording.position, force)
     except RecordingError as error:
         raise RecordingError(f"'{samples}': {error}") from error
     beside = [s for s in recording.segments if s.end_s < t[0] or s.start_s > t[-1]]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binom
 
+from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import Result
@@ -107,7 +108,6 @@ class Checkup(Result):
         return tuple(f for f in self.findings if f.grave)
 
 
-LEAST_PA, MOST_PA = 500.0, 5e6
 _MISFIT = 0.5
 
 
@@ -137,7 +137,7 @@ def outcome_of(
 def outcome(result: ReconstructionOutcome) -> Iterator[Finding]:
     """A modulus or interval that is none; a modulus beyond soft objects; a misfit as large as the force."""
     modulus, (low, high) = result.modulus_pa, result.ci95_pa
-    numbers = np.array([modulus, low, high])
+    numbers, possible = np.array([modulus, low, high]), EXPLORATION["modulus"]
     if not np.isfinite(numbers).all() or not 0 < low <= high:
         yield Finding(
             "no interval",
@@ -147,11 +147,12 @@ def outcome(result: ReconstructionOutcome) -> Iterator[Finding]:
             np.inf,
             np.inf,
         )
-    elif not LEAST_PA < modulus < MOST_PA:
+    elif not possible.low < modulus < possible.high:
         yield Finding(
             "modulus",
-            f"the modulus is {modulus:.4g} Pa; objects that can be felt so have 0.5 kPa to 5 MPa",
-            f"{max(LEAST_PA / modulus, modulus / MOST_PA):.3g} times beyond",
+            f"the modulus is {modulus:.4g} Pa; objects that can be felt so have "
+            f"{possible.low / 1e3:g} kPa to {possible.high / 1e6:g} MPa",
+            f"{max(possible.low / modulus, modulus / possible.high):.3g} times beyond",
             "check the units of position and force, and the tip's radius",
             np.inf,
             np.inf,

@@ -12,6 +12,7 @@ import numpy as np
 
 from palpate.mechanics.errors import ContactError, NoBaseError, RecordingError
 from palpate.mechanics.model.files import read_model
+from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.recording.recording import Recording, base_model_of
 from palpate.reconstruction.checks.air import air, delay
 from palpate.reconstruction.checks.channels import channels
@@ -20,7 +21,7 @@ from palpate.reconstruction.checks.finding import Finding, ReconstructionOutcome
 from palpate.reconstruction.checks.handedness import handedness
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
-from palpate.reconstruction.checks.units import QUANTITIES, measured, settled
+from palpate.reconstruction.checks.units import measured, settled
 from palpate.reconstruction.geometry.stated import GeometryOptions, base_of_model, stated_geometry
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
@@ -122,7 +123,7 @@ def seen(data: Samples | None) -> Seen:
     """What the checks measure on the way."""
     if data is None:
         return ()
-    rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(data).items()]
+    rows = [(EXPLORATION[k].words, v, EXPLORATION[k].usual) for k, v in measured(data).items()]
     free = np.linalg.norm(data.air, axis=1)
     return (
         *rows,

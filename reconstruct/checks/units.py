@@ -8,12 +8,13 @@ quantities other values. What is known of them is wide and log-normal; ratios to
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from scipy.stats import norm
 
+from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.statistics import weighted_quantile
 from palpate.reconstruction.checks.finding import SURE_ODDS, Finding, p_words, sure
@@ -38,40 +39,6 @@ _PRIOR = 1e-2
 """Odds on a reading other than SI before anything is seen."""
 _ELSE = 1e-3
 """Probability that a quantity is out of the usual for a reason that has nothing to do with units."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What a hand's exploration gives: median of what is usual, the factor of one standard deviation, and how
-    the value goes with the units of time, position, force and tip. stated: a ratio to what the recording
-    says."""
-
-    words: str
-    usual: float
-    factor: float
-    powers: tuple[float, float, float, float]
-    stated: bool = False
-
-    def off(self, value: float, shift: float = 0.0) -> float:
-        """Standard deviations from the usual, ln of a factor taken off."""
-        return float((np.log(value / self.usual) - shift) / np.log(self.factor))
-
-
-QUANTITIES = {
-    "duration": Quantity("duration [s]", 100.0, 3.0, (1, 0, 0, 0)),
-    "rate": Quantity("rate over the stated one", 1.0, 1.2, (-1, 0, 0, 0), stated=True),
-    "speed": Quantity("speed in the air [m/s]", 0.06, 2.5, (-1, 1, 0, 0)),
-    "touch": Quantity("time from first touch to the peak [s]", 0.4, 2.5, (1, 0, 0, 0)),
-    "extent": Quantity("extent of the path [m]", 0.15, 2.0, (0, 1, 0, 0)),
-    "tip": Quantity("tip's radius [m]", 0.0045, 2.2, (0, 0, 0, 1)),
-    "ratio": Quantity("extent of the path over the tip's radius", 33.0, 2.0, (0, 1, 0, -1)),
-    "depth": Quantity("depth of a press over the tip's radius", 0.9, 2.0, (0, 1, 0, -1)),
-    "resolution": Quantity("step of the positions over the stated one", 1.0, 1.3, (0, 1, 0, 0), stated=True),
-    "peak": Quantity("greatest force of a press [N]", 1.2, 3.0, (0, 0, 1, 0)),
-    "noise": Quantity("force noise an axis [N]", 0.012, 3.0, (0, 0, 1, 0)),
-    "noise stated": Quantity("force noise over the stated one", 1.0, 1.3, (0, 0, 1, 0), stated=True),
-    "modulus": Quantity("modulus by Hertz [Pa]", 5e4, 4.6, (0, -1.5, 1, -0.5)),
-}
 _OF_TIME = ("duration", "rate", "speed", "extent")
 
 
@@ -101,7 +68,7 @@ def settled(recording: Recording, cutoff_hz: float) -> tuple[Samples, tuple[Find
 def _beyond(seen: dict[str, float]) -> Iterator[Finding]:
     """A quantity that no reading of the units makes usual. (A simulation has no noise.)"""
     for name, value in seen.items():
-        q = QUANTITIES[name]
+        q = EXPLORATION[name]
         z = abs(q.off(value))
         decades = float(-(norm.logsf(z) + np.log(2)) / np.log(10))
         if q.stated or name == "noise" or not sure(decades):
@@ -130,7 +97,7 @@ def _best(seen: dict[str, float]) -> tuple[dict[str, str], dict[str, float]]:
         logs = [np.log(READINGS[kind][name]) for kind, name in zip(kinds, names, strict=True)]
         total = float(np.log(_PRIOR)) * sum(x != 0.0 for x in logs)
         for name, value in seen.items():
-            q = QUANTITIES[name]
+            q = EXPLORATION[name]
             z = q.off(value, sum(p * x for p, x in zip(q.powers, logs, strict=True)))
             usual = 1 / (1 + z**2) if q.stated else np.exp(-0.5 * z**2)
             total += float(np.log((1 - _ELSE) * usual + _ELSE))
@@ -147,7 +114,7 @@ def _best(seen: dict[str, float]) -> tuple[dict[str, str], dict[str, float]]:
 
 def _finding(data: Samples, kind: str, name: str, odds: float, seen: dict[str, float]) -> Finding:
     index, columns = list(READINGS).index(kind), COLUMNS[kind]
-    shown = [(QUANTITIES[k], v) for k, v in seen.items() if QUANTITIES[k].powers[index]]
+    shown = [(EXPLORATION[k], v) for k, v in seen.items() if EXPLORATION[k].powers[index]]
     shown.sort(key=lambda pair: -abs(pair[0].off(pair[1])))
     listed = ", ".join(f"{q.words} {v:.3g} (usual {q.usual:.3g})" for q, v in shown[:_SHOWN])
     return Finding(
@@ -163,7 +130,7 @@ def _finding(data: Samples, kind: str, name: str, odds: float, seen: dict[str, f
 
 
 def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:
-    """The quantities of QUANTITIES that the recording has, in the units of `data`."""
+    """The quantities of EXPLORATION that the recording has, in the units of `data`."""
     recording, radius = data.recording, data.tip_radius_m
     every = max(1, round(0.05 * data.rate_hz))
     moved = np.linalg.norm(np.diff(data.position[::every], axis=0), axis=1)

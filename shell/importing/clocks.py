@@ -12,14 +12,13 @@ from palpate.importing.mapping import ROLES, Column, Said, time_of
 from palpate.importing.meaning import MOST_ODDS, BestReading, clock_of, clock_starts, joined, settled_clock
 from palpate.importing.tables import Table
 from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.plausible import SAMPLE_RATE
 from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
 _SEARCH_S, _SURE = 3.0, 0.5
 _MOST_HZ = 2000.0
 POINTS_HZ = 100.0
-"""Rows without a time are numbered by this clock, and slower readings put on it; a recording needs one."""
-LEAST_HZ = 60.0
-"""Slower readings are drawn out to a faster clock."""
+"""Rows without a time are numbered by this clock, and readings slower than a recording's put on it."""
 PARTS = {"position": ROLES[1:4], "force": ROLES[4:7], "orientation": ROLES[7:]}
 
 
@@ -117,7 +116,7 @@ def one_clock(
         len(t) == len(times["position"]) and np.array_equal(t, times["position"]) for t in times.values()
     )
     rate = float(f"{1 / np.median(np.diff(times['position'])):.9g}")  # 1000, not 999.9999999952
-    if together and said.offset_s in (None, 0, 0.0) and not said.rate_hz and rate >= LEAST_HZ:
+    if together and said.offset_s in (None, 0, 0.0) and not said.rate_hz and rate >= SAMPLE_RATE.low:
         t = times["position"] - times["position"][0]
         return t, place.values, push.values, None if turn is None else turn.values, rate
     offset = _offset(place, push, said, notes)
@@ -126,7 +125,7 @@ def one_clock(
     if not end > begin:
         raise RecordingError("the clocks of position and force share no time: give --offset S or auto")
     finest = max(1 / float(np.median(np.diff(t))) for t in times.values())
-    rate = said.rate_hz or (min(finest, _MOST_HZ) if finest >= LEAST_HZ else POINTS_HZ)
+    rate = said.rate_hz or (min(finest, _MOST_HZ) if finest >= SAMPLE_RATE.low else POINTS_HZ)
     t = begin + np.arange(int((end - begin) * rate) + 1) / rate
     even = {
         part: np.column_stack([np.interp(t, times[part], column) for column in streams[part].values.T])

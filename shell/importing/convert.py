@@ -16,12 +16,8 @@ from palpate.importing.meaning import MOST_ODDS, Unclear, best
 from palpate.importing.tables import Table
 from palpate.importing.units import SI
 from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.plausible import COLUMN
 from palpate.mechanics.recording.recording import Recording
-
-_WIDEST_M, _HARDEST_N, _SLOWEST_S = 3.0, 100.0, 0.5
-"""A unit that was only assumed is doubted beyond an arm's reach, a hand's push, a reading's interval."""
-_USUAL_WIDTH_M, _WIDTH_FACTOR = 0.05, 4.0
-"""How wide a path is, and by which factor that varies."""
 
 
 @dataclass(frozen=True)
@@ -100,10 +96,11 @@ def _sizes(columns: dict[str, Column]) -> list[str]:
     """Warnings of sizes that no palpation has in the unit that nobody said; raises RecordingError for a path
     that no arm reaches."""
     found = []
-    for kind, roles, most, units in (
-        ("position", ("x", "y", "z"), _WIDEST_M, ("mm", "um", "nm")),
-        ("force", ("fx", "fy", "fz"), _HARDEST_N, ("mN", "uN", "nN")),
+    for kind, roles, units in (
+        ("position", ("x", "y", "z"), ("mm", "um", "nm")),
+        ("force", ("fx", "fy", "fz"), ("mN", "uN", "nN")),
     ):
+        most = COLUMN[kind].high
         held = [columns[r] for r in roles if r in columns and columns[r].assumed]
         size = max((_size(kind, np.asarray(c.values)) for c in held), default=0.0)
         if size <= most:
@@ -122,7 +119,7 @@ def _sizes(columns: dict[str, Column]) -> list[str]:
 
 def _doubted(assumed: Mapping[str, Column]) -> None:
     """Raise Unclear where positions or times whose unit nobody said may as well be in mm or ms."""
-    if "t" in assumed and _size("time", np.asarray(assumed["t"].values)) > _SLOWEST_S:
+    if "t" in assumed and _size("time", np.asarray(assumed["t"].values)) > COLUMN["time"].high:
         step = _size("time", np.asarray(assumed["t"].values))
         raise Unclear(
             f"a row comes every {step:.3g}, and nobody said whether ms or s", "units", ("time=ms", "time=s")
@@ -132,7 +129,7 @@ def _doubted(assumed: Mapping[str, Column]) -> None:
     if not width_m > 0:
         return
     scores: dict[tuple[int, ...], float] = {
-        (k,): -0.5 * (np.log(width_m * SI["position"][unit] / _USUAL_WIDTH_M) / np.log(_WIDTH_FACTOR)) ** 2
+        (k,): -0.5 * COLUMN["position"].off(width_m * SI["position"][unit]) ** 2
         for k, unit in enumerate(("m", "mm"))
     }
     reading = best(scores)

@@ -19,14 +19,12 @@ from palpate.importing.meaning import (
 )
 from palpate.importing.units import SI, without_unit
 from palpate.mechanics.errors import ContactError, RecordingError
+from palpate.mechanics.plausible import CURVE, UNIT_SHARES
 
 _INTO = ("depth", "indentation", "indent", "compression", "travel", "penetration")
 _OUT = ("height", "gap", "toolgap")
 _NAMED, _USUAL = float(np.log(6.0)), float(np.log(2.0))
 """What a name tells of a direction, and that z points up, travel down, load into the sample (nats)."""
-_DEEPEST_RADII = 20.0
-_LENGTH_FACTOR = 4.0
-_USUAL_E, _E_FACTOR = 2e4, 20.0
 
 
 @dataclass(frozen=True)
@@ -88,10 +86,10 @@ def in_units(
     z, fz = raw.columns["z"], raw.columns["fz"]
     length = force = 1.0
     if z.assumed and depth > 0:
-        sizes = {unit: depth * SI["position"][unit] / (0.5 * tip_radius_m) for unit in _LENGTHS}
-        length = _likely(sizes, _LENGTHS, _LENGTH_FACTOR, "position", raw, notes, odds)
+        sizes = {unit: depth * SI["position"][unit] / tip_radius_m for unit in UNIT_SHARES["position"]}
+        length = _likely("position", sizes, raw, notes, odds)
     depth *= length
-    if depth > _DEEPEST_RADII * tip_radius_m:
+    if depth > CURVE["position"].high * tip_radius_m:
         raise ContactError(
             f"'{raw.path}': the tip would go {depth:.3g} m deep, {depth / tip_radius_m:.0f} of its radii: "
             f"are the units and signs of '{z.name}' and '{fz.name}' right? say --units position=mm, --column "
@@ -99,22 +97,21 @@ def in_units(
         )
     if fz.assumed and depth > 0 and push > 0:
         modulus = push / (16 / 9 * np.sqrt(tip_radius_m) * depth**1.5)
-        moduli = {unit: modulus * SI["force"][unit] / _USUAL_E for unit in _FORCES}
-        force = _likely(moduli, _FORCES, _E_FACTOR, "force", raw, notes, odds)
+        moduli = {unit: modulus * SI["force"][unit] for unit in UNIT_SHARES["force"]}
+        force = _likely("force", moduli, raw, notes, odds)
     if length == force == 1.0:
         return list(curves)
     return [MachineCycle(c.t, length * c.travel, force * c.force, c.name) for c in curves]
 
 
 def _likely(
-    sizes: Mapping[str, float], priors: Mapping[str, float], factor: float, kind: str, raw: RawCurves,
-    notes: list[str], odds: list[float],
-) -> float:  # fmt: skip
-    """What one is in SI of the likeliest unit: sizes are over the usual one, which is known to a factor."""
-    units = list(sizes)
+    kind: str, sizes: Mapping[str, float], raw: RawCurves, notes: list[str], odds: list[float]
+) -> float:
+    """What one is in SI of the likeliest unit; sizes: what CURVE knows of the kind, by the unit it is in."""
+    units, shares = list(sizes), UNIT_SHARES[kind]
     reading = best(
         {
-            (k,): float(np.log(priors[unit]) - 0.5 * (np.log(sizes[unit]) / np.log(factor)) ** 2)
+            (k,): float(np.log(shares[unit]) - 0.5 * CURVE[kind].off(sizes[unit]) ** 2)
             for k, unit in enumerate(units)
         }
     )
@@ -130,11 +127,6 @@ def _likely(
     if unit != units[0]:
         notes.append(f"'{name}' names no unit: taken as {unit} ({reading.words})")
     return SI[kind][unit]
-
-
-_LENGTHS = {"m": 1.0, "mm": 1.0, "um": 0.3}
-_FORCES = {"N": 0.85, "mN": 0.1, "gf": 0.05}
-"""Units that a column may be in that says none."""
 
 
 def _dent(curve: MachineCycle) -> tuple[float, float]:

@@ -37,8 +37,8 @@ from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import SI, without_unit
 from palpate.mechanics.bounds import LARGEST_N
 from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.recording.recording import NotRead
-from palpate.mechanics.recording.sane import WIDEST_PATH_M
 from palpate.render.press import COLUMNS as PRESS_COLUMNS
 
 LEAST_ROWS = 8
@@ -181,10 +181,10 @@ def _one_clock(
 
 def _check_sizes(raw: RawCurves) -> None:
     """Raise for lengths and loads that no machine has."""
-    travelled = float(np.ptp(raw.position))
-    if travelled > WIDEST_PATH_M:
+    travelled, most = float(np.ptp(raw.position)), EXPLORATION["extent"].high
+    if travelled > most:
         raise RecordingError(
-            f"'{raw.path}': the tip travels {travelled:.4g} m, which may be {WIDEST_PATH_M:g} m: name "
+            f"'{raw.path}': the tip travels {travelled:.4g} m, which may be {most:g} m: name "
             "the unit, as in --units position=um"
         )
     if np.abs(raw.load).max() > LARGEST_N:

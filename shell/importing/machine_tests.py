@@ -21,6 +21,7 @@ from palpate.importing.formats.registry import SHEET_SUFFIXES, TEXT_SUFFIXES
 from palpate.importing.meaning import MOST_ODDS, Unclear
 from palpate.importing.tables import read_tables
 from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.plausible import MACHINE_TIP_RADIUS
 from palpate.reconstruction.machine_curves.indentation import read_chiaro
 from palpate.reconstruction.machine_curves.uniaxial import of_compression, read_tension
 
@@ -29,7 +30,6 @@ _LOOK = 4000
 _SAYING = (*TEXT_SUFFIXES, *SHEET_SUFFIXES)
 """Files with words beside the numbers."""
 _BEYOND = 1e15
-_TIPS_M = (1e-9, 0.1)
 _MODULUS = ("relaxationmodulus", "modulus", "g", "e")
 
 
@@ -118,10 +118,10 @@ def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCur
             notes.append(f"tip radius {1e3 * tip_radius_m:.4g} mm, as the file says")
     if tip_radius_m is None:
         raise Unclear("the tip's radius in m is in no file", "tip_radius_m", ())
-    if not _TIPS_M[0] <= tip_radius_m <= _TIPS_M[1]:
+    low, high = MACHINE_TIP_RADIUS.low, MACHINE_TIP_RADIUS.high
+    if not low <= tip_radius_m <= high:
         raise OptionError(
-            f"--tip-radius is {tip_radius_m:g} m; it must lie between {_TIPS_M[0]:g} and "
-            f"{_TIPS_M[1]:g} m: give metres"
+            f"--tip-radius is {tip_radius_m:g} m; it must lie between {low:g} and {high:g} m: give metres"
         )
     if others:
         read = read_curves(others, said, tip_radius_m)

@@ -30,13 +30,14 @@ from palpate.importing.units import SI, plain, unit_in, without_unit
 from palpate.mechanics.disk.reading import read_toml
 from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
 from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.plausible import MACHINE_TIP_RADIUS, TOOL_MASS
 from palpate.mechanics.recording.files import SCHEMA
 
 ROLES = ("t", "x", "y", "z", "fx", "fy", "fz", "qw", "qx", "qy", "qz")
 KIND = {"t": "time", **dict.fromkeys("xyz", "position"), **dict.fromkeys(("fx", "fy", "fz"), "force")}
 _NUMBERS = {
-    "tip_radius_m": FileKey(low=1e-9, high=0.1, unit="m"),
-    "mass_kg": FileKey(low=0.0, high=5.0, unit="kg"),
+    "tip_radius_m": MACHINE_TIP_RADIUS,
+    "mass_kg": TOOL_MASS,
     "flange_to_tip_m": FileKey(low=-2.0, high=2.0, size=3, unit="m"),
     "rate_hz": FileKey(low=1e-3, high=1e6, unit="Hz"),
     "tare_s": FileKey(size=2, unit="s"),

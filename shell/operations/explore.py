@@ -24,7 +24,7 @@ from palpate.diagnosis.explore.segments import Instrument
 from palpate.diagnosis.explore.suggestion import Explored
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import check_ranges
-from palpate.mechanics.quantities import POISSON_RATIO
+from palpate.mechanics.plausible import POISSON_RATIO
 from palpate.mechanics.recording.recording import read_recording
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._run import say_next

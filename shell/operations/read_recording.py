@@ -29,16 +29,16 @@ def read_recording(asked: ReadOperands, call: Call) -> Recording:
     Times s, positions of the tip's centre m, forces on the tool N, device frame.
     Raises RecordingError for what is missing or impossible.
     """
+    from palpate.mechanics.recording.files import check_plausible
     from palpate.mechanics.recording.recording import Recording as Plain
     from palpate.mechanics.recording.recording import read_recording as read
-    from palpate.mechanics.recording.sane import check_sane
     from palpate.scenes.embedded import embedded_names, embedded_recording
 
     source = asked.source
     held = source if isinstance(source, Plain) else getattr(source, "recording", None)
     if isinstance(held, Plain):
         try:
-            check_sane(
+            check_plausible(
                 held.t, held.sample_rate_hz, held.position, held.force_on_tool
             )  # arrays get what files get
         except RecordingError as error:

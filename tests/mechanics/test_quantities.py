@@ -11,6 +11,7 @@ from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model import files as model_files
+from palpate.mechanics.plausible import COLUMN, CURVE, EXPLORATION, TIP_RADIUS, USUAL_TIP_RADIUS_M
 from palpate.mechanics.quantities import parse_unit, prefixed, quantity_words, read_unit, unit_of_key
 from palpate.mechanics.recording import recording
 
@@ -97,3 +98,20 @@ def test_every_unit_that_the_program_states_can_be_parsed():
 )
 def test_values_are_said_as_people_write_them(key, value, said):
     assert quantity_words(key, value) == said
+
+
+@pytest.mark.parametrize("name", EXPLORATION)
+def test_what_is_plausible_goes_with_its_unit_and_is_possible(name):
+    row = EXPLORATION[name]
+    if not row.stated:
+        unit, (time, position, force, tip) = parse_unit(row.unit), row.powers
+        assert (unit.time, unit.length, unit.force) == (time, position + tip, force)
+    assert row.low <= row.usual <= row.high and row.likely[0] <= row.usual <= row.likely[1]
+    assert row.off(row.usual) == 0 and row.off(row.usual * row.factor) == pytest.approx(1)
+
+
+def test_the_usual_is_possible_everywhere():
+    for row in (*COLUMN.values(), *CURVE.values()):
+        parse_unit(row.unit)
+        assert row.usual != row.usual or row.low <= row.usual <= row.high
+    assert TIP_RADIUS.takes(USUAL_TIP_RADIUS_M)
