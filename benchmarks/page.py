@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 import psutil
-from tests.palpate.show.browser import Tab, a_tab, browser_found
 
 from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
@@ -34,6 +33,7 @@ from palpate.output import progress_bar
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.press import Stroke, press
 from palpate.render.scene import in_the_air
+from tests.shell.show.browser import Tab, a_tab, browser_found
 
 OBJECTS = ("silicone-1", "silicone-2", "silicone-3", "bean", "nodule")
 SHARE, AT_LEAST_N = 0.02, 0.005

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tests.palpate.window.driven import Driven, as_the_ghost_says
 
 from palpate.devices.channel import PoseChannel
 from palpate.devices.registry import DeviceChoice
@@ -31,6 +30,7 @@ from palpate.scenes.scene import load_scene
 from palpate.window.guide import Guide
 from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.window import TouchWindow
+from tests.shell.window.driven import Driven, as_the_ghost_says
 from tools.script import script
 
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "guided-session.png"

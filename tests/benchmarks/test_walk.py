@@ -3,7 +3,7 @@
 import palpate.mechanics.names
 from tools.walk import Walk, returns, stretches
 
-FILES = ["a/one.py", "a/two.py", "b/one.py", "a/three.py", "c/one.py", "b/two.py", "a/four.py"]
+FILES = ["a.one", "a.two", "b.one", "a.three", "c.one", "b.two", "a.four"]
 
 
 def test_a_return_is_another_file_of_a_room_that_was_left():
@@ -15,4 +15,6 @@ def test_a_file_is_entered_once_by_its_first_call():
     with Walk() as walk:
         palpate.mechanics.names.unknown("on", "word", ["one", "two"])
         palpate.mechanics.names.unknown("to", "word", ["one", "two"])
-    assert list(walk.files) == ["mechanics/names.py"] and walk.files["mechanics/names.py"] == "unknown"
+    assert (
+        list(walk.files) == ["palpate.mechanics.names"] and walk.files["palpate.mechanics.names"] == "unknown"
+    )

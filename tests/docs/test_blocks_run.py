@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.palpate.importing.test_meaning import press, write
 
 import palpate as pp
 from palpate import cli
+from tests.shell.importing.test_meaning import press, write
 from tests.support.waiting import eventually
 
 REPOSITORY = Path(__file__).resolve().parents[2]

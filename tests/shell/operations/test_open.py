@@ -7,10 +7,10 @@ import json
 
 import numpy as np
 import pytest
-from tests.palpate.importing.test_meaning import MODULUS, press, write
 
 import palpate as pp
 from palpate import cli
+from tests.shell.importing.test_meaning import MODULUS, press, write
 
 
 def curve(folder):

@@ -19,6 +19,7 @@ from palpate.mechanics.errors import DeviceError, PalpateError
 from palpate.servo import Recorder, SafetyOptions, Servo, ServoOptions
 from palpate.servo.started import StartedServo
 
+from ...conftest import REPOSITORY
 from ...devices.fake_inverse import FakeInverse
 from ...support.waiting import PATIENCE_S, eventually
 
@@ -27,6 +28,12 @@ pytest.importorskip("websockets")
 # The emulator shares a machine with noisy neighbours, which stall it longer than a service is ever silent. A
 # late pose or a lost link rightly takes the force away, which is not what is looked for here.
 ANSWER_S, STALE_S = 10.0, 2.0
+
+
+@pytest.fixture(autouse=True)
+def with_the_benchmarks_planes(monkeypatch):
+    """The servo's process makes what these tests feel, which lies in the clone and not in what is installed."""
+    monkeypatch.setenv("PYTHONPATH", str(REPOSITORY))
 
 
 def choice(fake: FakeInverse) -> DeviceChoice:

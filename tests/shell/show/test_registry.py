@@ -120,7 +120,7 @@ def test_without_palpate_a_result_prints_its_numbers_and_says_what_to_import():
         "    made.plot()\n"
         "except Exception as error:\n"
         "    print(error)\n"
-        "print([m for m in ('matplotlib', 'pyvista', 'palpate') if m in sys.modules])\n"
+        "print([m for m in ('matplotlib', 'pyvista', 'palpate.show') if m in sys.modules])\n"
         "import palpate.show\n"
         "print(made)\n"
     )
