@@ -1,23 +1,19 @@
-"""The diagnosis from recording and model to verdict: where, which, how far."""
+"""The diagnosis from recording and model to verdict, where, which, how far: measure, search, conclude.
+
+Each stage is a function of what came before; the recording ends with the first.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.diagnosis.forward.prediction import build_forward, solved
-from palpate.diagnosis.forward.touches import REACH_M, reached, touches_of, unobservable_effects
-from palpate.diagnosis.instrument.free_air import free_air_of
-from palpate.diagnosis.instrument.instrument_effects import (
-    find_instrument_offsets,
-    read_sideways,
-    ruled_out,
-    seen_play,
-    with_move,
-)
-from palpate.diagnosis.instrument.retraced import move_of
-from palpate.diagnosis.instrument.support_readings import rigid_of
+from palpate.diagnosis.forward.prediction import Forward, build_forward, solved
+from palpate.diagnosis.instrument.free_air_offsets import InstrumentOffsets
+from palpate.diagnosis.instrument.instrument_effects import read_sideways, ruled_out, seen_play, taken_off
+from palpate.diagnosis.instrument.readings import Readings, readings_of
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from palpate.diagnosis.search.attribution import attribute
 from palpate.diagnosis.search.descent import misfit_of
@@ -26,7 +22,7 @@ from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.diagnosis.verdict.conclusion import conclude
 from palpate.diagnosis.verdict.result import Diagnosis
-from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
@@ -47,83 +43,116 @@ def diagnose(
     """Diagnose the gap between a recording and its model. Raises DiagnosisError where the data cannot carry
     it."""
     options = options or DiagnoseOptions()
-    nuisance = nuisance or NuisanceOptions()
     rules = attribution or AttributionOptions()
     rules = rules.within(1) if options.fast else rules
     clock = Clock()
-
-    progress("touches", 0.02)
-    presses = presses_on(recording, model)
-    given, model = model, with_tip_of(model, presses)
-    # a surface of another recording's presses may be passed because the object moved
-    own = model.fitted_to(presses)
-    met = reached(presses) if own else np.ones(len(presses), dtype=bool)
-    touches = touches_of(presses.of(met))
-    clock.lap("touches")
-    progress("sites", 0.05)
-    forward = build_forward(touches, model)
-    clock.lap("sites")
-    if options.exact:
-        forward = solved(forward, part(progress, 0.05, 0.1))
-        clock.lap("solved places")
-
-    unobservable = unobservable_effects(presses)
-    excluded = {*options.left_out, *unobservable}
-    free = free_air_of(recording, presses)
-    rigid = rigid_of(recording, presses, model.support.normal)
-    offsets = find_instrument_offsets(forward, free, rigid, excluded, rules)
-    centre = touches.point.mean(axis=0)
-    move = move_of(recording, presses, model.support.normal, centre) if own else None
-    offsets = with_move(offsets, forward, move, excluded, rules)
-
-    settled = {*offsets.names, *ruled_out(forward, rigid, move, rules)}
-    site_sd = site_stiffness_sd(forward, nuisance)
-    if touches.sites != presses.of(met).sites:
-        # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
-        site_sd = np.full(len(touches), nuisance.press_stiffness)
-    search = Search(
-        forward, model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
-        finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
-    )  # fmt: skip
-    left_out = {e.name for e in effects() if e.hints.expensive and options.fast}
-    hidden = {e.name for e in effects() if e.hints.by_first_touches and own}
-    able = [e for e in effects(without=excluded) if e.role is Role.SEARCHED]
-    tried = [e for e in able if e.name not in (left_out | settled | hidden)]
-    progress("baseline", 0.12)
-    base = search.judge([search.finite_strain])
-    misfit = misfit_of(forward, base.found, site_sd)
-    search.starts = {e.name: e.hints.seek(forward, misfit) for e in tried if e.hints.seek is not None}
-    clock.lap("baseline")
-    seen = read_sideways(rigid, rules) & frozenset(e.name for e in tried)
-    if rigid is not None and seen:
-        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
-    known = seen_play(rigid, excluded, rules)
-    if rigid is not None and known is not None:
-        seen |= {known.name}
-        tried = [known if e.name == known.name else e for e in tried]
-        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words_of_play))
-    if not met.all():
-        lost = f"presses not weighed, as the surface passes them by over {1e3 * REACH_M:g} mm: {(~met).sum()}"
-        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, lost))
-    found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
-    clock.lap("effects")
-    for name in sorted(seen - set(found.chosen)):
-        refused = f"{name.replace('_', ' ')}: the presses do not bear that out, so it is not named"
-        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, refused))
-
-    findings = Findings(
-        forward, search, found, free, offsets, site_sd, frozenset(excluded),
-        options.bootstrap, options.seed, refit=not options.fast,
-    )  # fmt: skip
+    corrected = measure(recording, model, options, rules, progress, clock)
+    findings = search(corrected, options, nuisance or NuisanceOptions(), rules, progress, clock)
     result = conclude(findings, clock.lap)
     progress("done", 1.0)
     return dataclasses.replace(
         result,
         seconds={name: round(s, 2) for name, s in clock.laps.items()},
-        left_out=tuple(sorted(left_out | unobservable | hidden - settled)),
+        left_out=corrected.untried,
         recording=recording,
-        model=given,
+        model=model,
     )
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """The presses with all taken off that the instrument shows of itself, and what is left to search for.
+
+    forward: their mechanics. offsets: what was taken off. excluded: names left out by options or that such
+    presses cannot show. tried: effects that are searched for; untried: names of the others, sorted.
+    """
+
+    readings: Readings
+    forward: Forward
+    offsets: InstrumentOffsets
+    excluded: frozenset[str]
+    tried: tuple[Effect, ...]
+    untried: tuple[str, ...]
+
+
+def measure(
+    recording: Recording,
+    model: Model,
+    options: DiagnoseOptions,
+    rules: AttributionOptions,
+    progress: Progress,
+    clock: Clock,
+) -> Corrected:
+    """What the recording shows before any effect is searched for."""
+    progress("touches", 0.02)
+    presses = presses_on(recording, model)
+    fitted, model = model.fitted_to(presses), with_tip_of(model, presses)
+    readings = readings_of(recording, presses, model.support.normal, fitted=fitted)
+    clock.lap("touches")
+    progress("sites", 0.05)
+    forward = build_forward(readings.touches, model)
+    clock.lap("sites")
+    if options.exact:
+        forward = solved(forward, part(progress, 0.05, 0.1))
+        clock.lap("solved places")
+    excluded = frozenset({*options.left_out, *readings.unobservable})
+    offsets = taken_off(readings, forward, excluded, rules)
+    settled = {*offsets.names, *ruled_out(forward, readings.rigid, readings.move, rules)}
+    left_out = {e.name for e in effects() if e.hints.expensive and options.fast}
+    hidden = {e.name for e in effects() if e.hints.by_first_touches and fitted}
+    able = [e for e in effects(without=set(excluded)) if e.role is Role.SEARCHED]
+    return Corrected(
+        readings,
+        forward,
+        offsets,
+        excluded,
+        tried=tuple(e for e in able if e.name not in (left_out | settled | hidden)),
+        untried=tuple(sorted(left_out | readings.unobservable | (hidden - settled))),
+    )
+
+
+def search(
+    corrected: Corrected,
+    options: DiagnoseOptions,
+    nuisance: NuisanceOptions,
+    rules: AttributionOptions,
+    progress: Progress,
+    clock: Clock,
+) -> Findings:
+    """What explains the presses best: all that a verdict rests on."""
+    readings, forward, tried = corrected.readings, corrected.forward, list(corrected.tried)
+    site_sd = site_stiffness_sd(forward, nuisance)
+    if readings.one_by_one:
+        # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
+        site_sd = np.full(len(readings.touches), nuisance.press_stiffness)
+    weighed = Search(
+        forward, forward.model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
+        finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
+    )  # fmt: skip
+    progress("baseline", 0.12)
+    base = weighed.judge([weighed.finite_strain])
+    misfit = misfit_of(forward, base.found, site_sd)
+    weighed.starts = {e.name: e.hints.seek(forward, misfit) for e in tried if e.hints.seek is not None}
+    clock.lap("baseline")
+    rigid, why = readings.rigid, list(corrected.offsets.reasons)
+    seen = read_sideways(rigid, rules) & frozenset(e.name for e in tried)
+    if rigid is not None and seen:
+        why.append(rigid.words)
+    play = seen_play(rigid, corrected.excluded, rules)
+    if rigid is not None and play is not None:
+        seen |= {play.name}
+        tried = [play if e.name == play.name else e for e in tried]
+        why.append(rigid.words_of_play)
+    found = attribute(weighed, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
+    clock.lap("effects")
+    why += readings.not_weighed
+    for name in sorted(seen - set(found.chosen)):
+        why.append(f"{name.replace('_', ' ')}: the presses do not bear that out, so it is not named")
+    offsets = dataclasses.replace(corrected.offsets, reasons=tuple(why))
+    return Findings(
+        forward, weighed, found, readings, offsets, site_sd, corrected.excluded,
+        options.bootstrap, options.seed, refit=not options.fast,
+    )  # fmt: skip
 
 
 def with_tip_of(model: Model, presses: Presses) -> Model:

@@ -3,6 +3,9 @@
 Source: Huber and Ronchetti, Robust Statistics, chapters 5 and 7; 4.7 scales is 95 % efficient on Gaussian
 errors.
 
+Standard errors by leaving out stretches of time in turn (the jackknife): what wanders slowly is no
+independent noise.
+
 Covariances of Gaussian processes by distance: how alike a field is at two places.
 
 Rasmussen and Williams, Gaussian Processes for Machine Learning, eqs. 4.9 and 4.17.
@@ -117,3 +120,15 @@ def matern_5_2(distance_m: np.ndarray, length_m: float) -> np.ndarray:
     """(1 + s + s^2 / 3) exp(-s), s = sqrt(5) r / L, at distances r, m: differentiable twice."""
     s = np.sqrt(5.0) * distance_m / length_m
     return (1 + s + s**2 / 3) * np.exp(-s)
+
+
+def all_but_one(count: int, stretches: int) -> list[np.ndarray]:
+    """Indices of `count` rows in time without each of so many stretches."""
+    rows = np.arange(count)
+    return [np.delete(rows, part) for part in np.array_split(rows, stretches)]
+
+
+def jackknife_covariance(each: np.ndarray) -> np.ndarray:
+    """(k, k) of an estimate, from those without each stretch, (s, k)."""
+    left = each - each.mean(axis=0)
+    return (len(each) - 1) / len(each) * left.T @ left

@@ -22,21 +22,24 @@ from palpate.mechanics.press_solver.solved_places import (
     solve_touched,
 )
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.progress import Clock, Progress, part
+from palpate.mechanics.progress import Clock, Progress, part, unsaid
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.reconstruction.geometry.stated import GeometryOptions, Placed
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s2_base import BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions
 from palpate.reconstruction.steps.s4_surface import CastPoints, Surface, SurfaceOptions
 from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, uncertainty_at
-from palpate.reconstruction.steps.s6_one_d import fit_paper, fit_robust
+from palpate.reconstruction.steps.s6_one_d import OneD, fit_paper, fit_robust
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
 from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from palpate.reconstruction.steps.s7_modulus.shape_error import compliance_covariance
 
 METHODS = ("finite-tip", "paper")
+Say = Callable[[str], None]
+"""Is told in words how long takes what takes minutes."""
 
 
 @dataclass(frozen=True)
@@ -64,18 +67,26 @@ class ReconstructOptions:
 
 @dataclass(frozen=True)
 class BodyToFit:
-    """What a modulus is fitted to. mesh: linear. presses: on the surface; curves: low-passed, in contact.
-    say: is told how long takes what takes minutes."""
+    """What was measured as a body, which a modulus is fitted to.
 
-    mesh: TetMesh
-    poisson_ratio: float
+    surface, placed: of the object, as it was found or is known. cast: the touched points of the surface.
+    presses: on it; curves: these, low-passed, in contact; one_d: fitted to each. mesh: linear.
+    """
+
+    measured: Measured
     surface: Surface
     placed: Placed | None
-    where: CastPoints
+    cast: CastPoints
     presses: Presses
     curves: Presses
-    noise_n: float
-    say: Callable[[str], None]
+    one_d: tuple[OneD, ...]
+    mesh: TetMesh
+    poisson_ratio: float
+
+    @property
+    def noise_n(self) -> float:
+        """N, standard deviation of the raw force an axis."""
+        return self.measured.noise_n
 
 
 @dataclass(frozen=True)
@@ -100,6 +111,11 @@ class ModulusOnMesh:
     solved: SolvedPresses | None = None
 
     @property
+    def misfit_n(self) -> np.ndarray | None:
+        """(p,) N, rms of each press; None by the paper's method, which states none."""
+        return None if self.modulus is None else self.modulus.press.rms_n
+
+    @property
     def dent_law(self) -> str:
         return "linear" if self.modulus is None else self.modulus.press.law
 
@@ -116,12 +132,12 @@ class FiniteTip:
         self.options = options
         self.surface_options, self.meshing_options = options.surface, options.meshing
 
-    def fit(self, body: BodyToFit, progress: Progress, clock: Clock) -> ModulusOnMesh:
+    def fit(self, body: BodyToFit, progress: Progress, clock: Clock, say: Say = unsaid) -> ModulusOnMesh:
         mesh, nu, placed = body.mesh.quadratic(), body.poisson_ratio, body.placed
         solver = touch_solver(body.mesh, nu)
         clock.lap("factorise")
         sites = touch_sites(
-            mesh, body.where.points, body.where.normals, nu, solver=solver, progress=part(progress, 0.5, 0.8)
+            mesh, body.cast.points, body.cast.normals, nu, solver=solver, progress=part(progress, 0.5, 0.8)
         )
         clock.lap("touch sites")
         progress("modulus", 0.8)
@@ -140,7 +156,7 @@ class FiniteTip:
         fit, solved = fitted(), None
         if self.options.modulus.exact:
             clock.lap("modulus")
-            solved = SolvedPresses(_solve(body, mesh, sites, fit, part(progress, 0.8, 0.95)), fit)
+            solved = SolvedPresses(_solve(body, mesh, sites, fit, part(progress, 0.8, 0.95), say), fit)
             clock.lap("solved places")
             fit = fitted(solved.presses.factors)
             sites = dataclasses.replace(sites, factors=solved.presses.factors[fit.press.law])
@@ -150,7 +166,7 @@ class FiniteTip:
 
 
 def _solve(
-    body: BodyToFit, mesh: TetMesh, sites: TouchSites, fit: ModulusFit, progress: Progress
+    body: BodyToFit, mesh: TetMesh, sites: TouchSites, fit: ModulusFit, progress: Progress, say: Say
 ) -> ExactPresses:
     """The touched places, by the laws of the dent that a fit with tabulated ones left open."""
     laws = [law for law, (_, _, share) in fit.by_law.items() if share > 0]
@@ -158,7 +174,7 @@ def _solve(
     places = TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing)
     touched = PlacesToSolve(sites.points, presses.site, presses.deepest, places)
     places_to_solve = len(deepest_of_sites(touched.site, touched.deepest_m))
-    body.say(f"--exact: {said_beforehand(places_to_solve, len(laws))}")
+    say(f"--exact: {said_beforehand(places_to_solve, len(laws))}")
     return solve_touched(
         mesh, touched, laws, ratio=np.ones(len(mesh.tetrahedra)), poisson_ratio=body.poisson_ratio,
         young_modulus_pa=fit.modulus_pa, tip_radius_m=presses.tip_radius_m,
@@ -182,7 +198,7 @@ class Paper:
         if options.meshing.mesh_source == "auto":
             self.meshing_options = dataclasses.replace(options.meshing, mesh_source="voxels")
 
-    def fit(self, body: BodyToFit, progress: Progress, clock: Clock) -> ModulusOnMesh:
+    def fit(self, body: BodyToFit, progress: Progress, clock: Clock, say: Say = unsaid) -> ModulusOnMesh:
         progress("modulus", 0.6)
         fit = fit_paper_modulus(
             body.curves, body.mesh, body.poisson_ratio, self.options.paper, seed=self.options.seed

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -14,28 +13,35 @@ import numpy as np
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.linear_range import linear_range
 from palpate.mechanics.disk.toml_text import plain
-from palpate.mechanics.errors import ContactError, NoBaseError, OptionError
-from palpate.mechanics.model.files import read_model
+from palpate.mechanics.errors import ContactError, OptionError
 from palpate.mechanics.model.material import Material
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
-from palpate.mechanics.recording.recording import Recording, base_model_of
+from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import Result
 from palpate.reconstruction.checks.finding import Finding, outcome_of
-from palpate.reconstruction.checks.registry import CheckupRun
+from palpate.reconstruction.checks.registry import (
+    checked_presses,
+    checked_results,
+    checked_samples,
+    refuse_grave,
+    widened,
+    with_findings,
+)
 from palpate.reconstruction.geometry.known_shape import place
 from palpate.reconstruction.geometry.stated import (
     GeometryOptions,
     Placed,
-    base_of_model,
     nowhere,
+    over_its_base,
     stated_geometry,
 )
-from palpate.reconstruction.methods import BY_NAME, BodyToFit, Method, ModulusOnMesh, SolvedPresses
+from palpate.reconstruction.measured import Measured
+from palpate.reconstruction.methods import BY_NAME, BodyToFit, Method, ModulusOnMesh, Say, SolvedPresses
 from palpate.reconstruction.methods import ReconstructOptions as ReconstructOptions
 from palpate.reconstruction.steps.s2_base import Boundary
-from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points, is_points
 from palpate.reconstruction.steps.s3_contacts.straightened import laid
@@ -62,13 +68,13 @@ class Reconstruction(Result):
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
-    findings: of the check-up, grave ones first; the interval is as wide as they make it. held_out: how the
-    model predicts places that were held out; None by the method paper, or of one place. exact: touched places
-    that were solved. `plot`: force over time with the touches that were found. `show`: the model.
+    held_out: how the model predicts places that were held out; None by the method paper, or of one place.
+    exact: touched places that were solved. `plot`: force over time with the touches that were found. `show`:
+    the model.
     """
 
     model: Model
-    exploration: Exploration
+    exploration: Measured
     surface: Surface
     meshing: Meshing
     cast: CastPoints
@@ -79,7 +85,6 @@ class Reconstruction(Result):
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
     placed: Placed | None = None
-    findings: tuple[Finding, ...] = ()
     held_out: HeldOutErrors | None = None
     exact: SolvedPresses | None = None
 
@@ -95,6 +100,11 @@ class Reconstruction(Result):
     def predicts(self) -> bool:
         """Whether nothing speaks against it: `doubt` is empty."""
         return not self.doubt
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the check-up, grave ones first; the interval is as wide as they make it."""
+        return self.exploration.findings
 
     @property
     def recording(self) -> Recording:
@@ -128,83 +138,171 @@ def reconstruct_fully(
     recording: Recording,
     options: ReconstructOptions | None = None,
     progress: Progress = silent,
-    say: Callable[[str], None] = unsaid,
+    say: Say = unsaid,
 ) -> Reconstruction:
-    """As `reconstruct`, with the intermediate results. say: is told how long takes what takes minutes."""
+    """As `reconstruct`, with the intermediate results: section 2 of the paper in order; what the two methods
+    do differently is theirs. say: is told how long takes what takes minutes."""
     options = options or ReconstructOptions()
     if options.method not in BY_NAME:
         raise OptionError(f"method {options.method!r} is unknown; allowed are {', '.join(BY_NAME)}")
-    method = BY_NAME[options.method](options)
+    method, clock = BY_NAME[options.method](options), Clock()
     with BackgroundMesher(method.meshing_options) as mesher:
-        return _reconstructed(recording, method, progress, mesher, say)
+        poisson_ratio = _poisson_ratio(recording, options)
+        progress("contacts", 0.02)
+        geometry = stated_geometry(recording, options.geometry)
+        measured = measure(recording, geometry, method)
+        if geometry.known:
+            shaped = _placed(measured, geometry, options, mesher, part(progress, 0.02, 0.3))
+            clock.lap("contacts and registration")
+        else:
+            clock.lap("contacts")
+            shaped = _surfaced(measured, method, mesher, part(progress, 0.1, 0.3))
+            clock.lap("surface")
+        progress("meshing", 0.3)
+        body = _meshed(shaped, geometry.kind, poisson_ratio, method, mesher, clock)
+        progress("factorise", 0.5)
+        fitted = method.fit(body, progress, clock, say)
+        return _concluded(body, fitted, options, mesher, progress, clock)
 
 
-def _reconstructed(
-    recording: Recording,
-    method: Method,
-    progress: Progress,
-    mesher: BackgroundMesher,
-    say: Callable[[str], None],
-) -> Reconstruction:
-    """Section 2 in order; what the two methods do differently is theirs."""
-    options, clock = method.options, Clock()
-    poisson_ratio = _poisson_ratio(recording, options)
-    progress("contacts", 0.02)
-    geometry = stated_geometry(recording, options.geometry)
+def measure(recording: Recording, geometry: GeometryOptions, method: Method) -> Measured:
+    """Signals, base and presses, with what the check-up finds in the samples.
+
+    Of a known geometry the touches alone, found without a support: they place it, and its base then shows
+    which of them lie on the support. Raises RecordingError for a grave finding, unless options.force.
+    """
+    options = method.options
     _check_points(recording, geometry, options)
-    checkup = CheckupRun(recording, options.force, not geometry.known, options.filter.cutoff_hz)
-    run = _Run(recording, method, checkup, mesher, clock)
-    placed: Placed | None
+    samples = checked_samples(recording, not geometry.known, options.filter.cutoff_hz)
+    refuse_grave(samples.found, options.force)
+
+    def found(base: Boundary | None) -> Measured:
+        if base is not None and is_points(recording):
+            return explore_points(recording, base, options.contact)
+        return explore(
+            recording,
+            method=method.contacts,
+            contact_options=options.contact,
+            boundary_options=options.boundary,
+            filter_options=options.filter,
+            boundary=base,
+            spans=samples.spans,
+            unbroken=geometry.known,
+        )
+
     if geometry.known:
-        exploration, surface, placed = _with_known_geometry(run, geometry, progress)
+        pressed = without_slides(found(nowhere(recording)), options.contact.least_palpations)
+        measured = within_slab(pressed, geometry.slab_m)
     else:
-        exploration, surface, placed = _with_traced_base(run, progress)
-    progress("meshing", 0.3)
-    found = exploration.presses
+        measured = over_its_base(recording, found)
+    return dataclasses.replace(measured, findings=samples.found)
+
+
+@dataclass(frozen=True)
+class _Shaped:
+    """What was measured on its base, and the object's surface; placed: a known geometry."""
+
+    measured: Measured
+    surface: Surface
+    placed: Placed | None = None
+
+
+def _surfaced(measured: Measured, method: Method, mesher: BackgroundMesher, progress: Progress) -> _Shaped:
+    """The surface through the touches."""
+    measured = with_findings(measured, checked_presses(measured), method.options.force)
+    evidence = evidence_of(measured)
+    return _Shaped(
+        measured, reconstruct_surface(evidence, method.surface_options, progress, shaped=mesher.begin)
+    )
+
+
+def _placed(
+    measured: Measured,
+    geometry: GeometryOptions,
+    options: ReconstructOptions,
+    mesher: BackgroundMesher,
+    progress: Progress,
+) -> _Shaped:
+    """The known geometry where the touches place it."""
+    progress("contacts", 0.3)
+    placed = place(
+        measured,
+        geometry,
+        mesh_size_m=options.meshing.mesh_size_m,
+        spacing_m=options.surface.surface_spacing_m,
+        progress=part(progress, 0.3, 0.8),
+    )
+    measured = on_base(measured, placed.base, options.contact.least_palpations)
+    measured = with_findings(measured, checked_presses(measured), options.force)
+    if placed.mesh is not None:
+        mesher.known(placed.mesh)
+    mesher.begin(placed.surface)
+    return _Shaped(measured, placed.surface, placed)
+
+
+def _meshed(
+    shaped: _Shaped, kind: str, poisson_ratio: float, method: Method, mesher: BackgroundMesher, clock: Clock
+) -> BodyToFit:
+    """Presses on the surface, 1D models of each, tetrahedra. kind: of the geometry."""
+    surface, options = shaped.surface, method.options
+    found = shaped.measured.presses
     where = cast(surface.vertices, surface.triangles, found.point, found.contact_normal).on(surface.shape)
-    least = options.contact.least_palpations
-    exploration, kept = on_surface(exploration, where.points, where.normals, least)
+    measured, kept = on_surface(
+        shaped.measured, where.points, where.normals, options.contact.least_palpations
+    )
     where = where.of(kept)
-    presses = laid(exploration.presses, where.points, where.normals, geometry.kind)
+    presses = laid(measured.presses, where.points, where.normals, kind)
     curves = profiles(presses, options.filter.cutoff_hz)
-    one_d = method.fit_one_d(curves, exploration.noise_n)
+    one_d = tuple(method.fit_one_d(curves, measured.noise_n))
     clock.lap("1D models")
     mesh = mesher.mesh(surface)
     clock.lap("mesh")
-    progress("factorise", 0.5)
-    body = BodyToFit(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n, say)
-    fitted = method.fit(body, progress, clock)
-    interval = checkup.interval(outcome_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
+    return BodyToFit(measured, surface, shaped.placed, where, presses, curves, one_d, mesh, poisson_ratio)
+
+
+def _concluded(
+    body: BodyToFit,
+    fitted: ModulusOnMesh,
+    options: ReconstructOptions,
+    mesher: BackgroundMesher,
+    progress: Progress,
+    clock: Clock,
+) -> Reconstruction:
+    """The model, its interval as wide as the findings make it, and how it predicts places held out."""
+    measured, surface = body.measured, body.surface
+    outcome = outcome_of(body.presses, fitted.modulus_pa, fitted.ci95_pa, fitted.misfit_n)
+    measured = with_findings(measured, checked_results(outcome), options.force)
+    interval = widened(fitted.modulus_pa, fitted.ci95_pa, measured.findings)
     clock.lap("modulus")
     progress("model", 0.95)
     meshing = mesher.judged()
+    tip_radius_m = measured.recording.tip_radius_m
     model = Model(
         mesh=fitted.mesh,
-        material=Material(fitted.modulus_pa, poisson_ratio, interval, dent_law=fitted.dent_law),
-        support=Support(exploration.boundary.support_point, exploration.boundary.support_normal),
-        tool=Tool(recording.tip_radius_m),
+        material=Material(fitted.modulus_pa, body.poisson_ratio, interval, dent_law=fitted.dent_law),
+        support=Support(measured.boundary.support_point, measured.boundary.support_normal),
+        tool=Tool(tip_radius_m),
         mesh_size_m=options.meshing.mesh_size_m,
         shape_uncertainty_m=uncertainty_at(fitted.mesh, surface),
-        presses=presses.with_fits(**columns(one_d, fitted.press_modulus_pa)),
-        provenance=_provenance(exploration, options, surface, fitted.modulus),
-        about=_tables(surface, placed, fitted.sites, recording.tip_radius_m),
+        presses=body.presses.with_fits(**columns(body.one_d, fitted.press_modulus_pa)),
+        provenance=_provenance(measured, options, surface, fitted.modulus),
+        about=_tables(surface, body.placed, fitted.sites, tip_radius_m),
     )
-    model, predicted = _judged(model, fitted, options.modulus_field.field, exploration.noise_n, clock)
+    model, predicted = _judged(model, fitted, options.modulus_field.field, measured.noise_n, clock)
     progress("done", 1.0)
     return Reconstruction(
         model=model,
-        exploration=exploration,
+        exploration=measured,
         surface=surface,
         meshing=meshing,
-        cast=where,
-        one_d=tuple(one_d),
+        cast=body.cast,
+        one_d=body.one_d,
         press_modulus_pa=fitted.press_modulus_pa,
         seconds=clock.laps,
         sites=fitted.sites,
         modulus=fitted.modulus,
         paper_fit=fitted.paper_fit,
-        placed=placed,
-        findings=checkup.found,
+        placed=body.placed,
         held_out=predicted,
         exact=fitted.solved,
     )
@@ -228,82 +326,6 @@ def _judged(
             predicted = held_out(presses, sites, modulus, of_field)
             clock.lap("held-out places")
     return model, predicted
-
-
-@dataclass(frozen=True)
-class _Run:
-    """A recording on its way to a surface, and what goes on beside it."""
-
-    recording: Recording
-    method: Method
-    checkup: CheckupRun
-    mesher: BackgroundMesher
-    clock: Clock
-
-    def presses(self, base: Boundary | None = None, unbroken: bool = False) -> Exploration:
-        """The palpations, over a base that is known or traced."""
-        options = self.method.options
-        if base is not None and is_points(self.recording):
-            return explore_points(self.recording, base, options.contact)
-        return explore(
-            self.recording,
-            method=self.method.contacts,
-            contact_options=options.contact,
-            boundary_options=options.boundary,
-            filter_options=options.filter,
-            boundary=base,
-            spans=self.checkup.spans,
-            unbroken=unbroken,
-        )
-
-
-def _with_traced_base(run: _Run, progress: Progress) -> tuple[Exploration, Surface, None]:
-    """Palpations and the surface through them. Where the recording traces no base, that of [object] model
-    = PATH stands in."""
-    recording = run.recording
-    try:
-        exploration = run.presses()
-    except NoBaseError:
-        if recording.base_model is None:
-            raise
-        base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
-        exploration = run.presses(base)
-    run.checkup.presses(exploration)
-    run.clock.lap("contacts")
-    surface = reconstruct_surface(
-        evidence_of(exploration),
-        run.method.surface_options,
-        part(progress, 0.1, 0.3),
-        shaped=run.mesher.begin,
-    )
-    run.clock.lap("surface")
-    return exploration, surface, None
-
-
-def _with_known_geometry(
-    run: _Run, geometry: GeometryOptions, progress: Progress
-) -> tuple[Exploration, Surface, Placed]:
-    """Touches found without a support place the geometry, whose base then shows which lie on the support."""
-    recording, options, within = run.recording, run.method.options, part(progress, 0.02, 0.3)
-    least = options.contact.least_palpations
-    first = without_slides(run.presses(nowhere(recording), unbroken=True), least)
-    first = within_slab(first, geometry.slab_m)
-    within("contacts", 0.3)
-    placed = place(
-        recording,
-        first,
-        geometry,
-        mesh_size_m=options.meshing.mesh_size_m,
-        spacing_m=options.surface.surface_spacing_m,
-        progress=part(within, 0.3, 0.8),
-    )
-    exploration = on_base(first, placed.base, least)
-    run.checkup.presses(exploration)
-    run.clock.lap("contacts and registration")
-    if placed.mesh is not None:
-        run.mesher.known(placed.mesh)
-    run.mesher.begin(placed.surface)
-    return exploration, placed.surface, placed
 
 
 def _check_points(recording: Recording, geometry: GeometryOptions, options: ReconstructOptions) -> None:
@@ -338,9 +360,9 @@ def _tables(
 
 
 def _provenance(
-    exploration: Exploration, options: ReconstructOptions, surface: Surface, fit: ModulusFit | None
+    measured: Measured, options: ReconstructOptions, surface: Surface, fit: ModulusFit | None
 ) -> dict[str, Any]:
-    recording = exploration.recording
+    recording = measured.recording
     about: dict[str, Any] = {
         "recording": recording.name,
         "recording_sha256": recording.sha256,
@@ -350,8 +372,8 @@ def _provenance(
         "surface_reason": surface.reason,
         "options": plain(dataclasses.asdict(options)),
     }
-    if exploration.delay_s:
-        about |= {"force_delay_s": exploration.delay_s, "force_delay_sd_s": exploration.delay_error_s}
+    if measured.delay_s:
+        about |= {"force_delay_s": measured.delay_s, "force_delay_sd_s": measured.delay_error_s}
     if fit is not None:
         about["modulus_reason"] = fit.reason
     return about

@@ -33,20 +33,16 @@ def presses_on(recording: Recording, model: Model) -> Presses:
     own = model.presses
     if own.sampled and own.recording == recording.content:
         return own
-    found = _found(recording, model)
+    base, stated = base_of_model(model, recording.tip_radius_m), stated_geometry(recording, GeometryOptions())
+    found = _found(recording, model, base, stated.known)
     where = cast(model.mesh.points, model.mesh.touchable_surface, found.point, found.contact_normal)
-    base = base_of_model(model, recording.tip_radius_m)
     reasons = off_surface(found, where.points, where.normals, base)
     kept = np.array([not reason for reason in reasons])
     if not kept.any():
         raise ContactError(f"none of the {len(kept)} presses is on the model: the first {reasons[0]}")
-    return laid(found.of(kept), where.points[kept], where.normals[kept], _kind(recording, model))
-
-
-def _kind(recording: Recording, model: Model) -> str:
-    """Of the geometry: as the model says it, where it was placed, else as the recording states it."""
-    placed = model.about.get("geometry", {}).get("kind")
-    return str(placed or stated_geometry(recording, GeometryOptions()).kind)
+    # the model says what it was placed as, else the recording states it
+    kind = str(model.about.get("geometry", {}).get("kind") or stated.kind)
+    return laid(found.of(kept), where.points[kept], where.normals[kept], kind)
 
 
 def check_near(recording: Recording, model: Model) -> None:
@@ -61,11 +57,12 @@ def check_near(recording: Recording, model: Model) -> None:
         )
 
 
-def _found(recording: Recording, model: Model) -> Presses:
-    base = base_of_model(model, recording.tip_radius_m)
+def _found(recording: Recording, model: Model, base: Boundary, known: bool) -> Presses:
+    """The presses as such, over the base that was traced, else over the model's. known: the recording states
+    its geometry."""
     if is_points(recording):
         return explore_points(recording, base, _ANY).presses
-    if not stated_geometry(recording, GeometryOptions()).known:
+    if not known:
         try:
             found = explore(recording, contact_options=_ANY)
         except ContactError:

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import build_forward
-from palpate.diagnosis.forward.touches import touches_of
-from palpate.diagnosis.instrument.free_air import free_air_of
-from palpate.diagnosis.instrument.instrument_effects import InstrumentOffsets, find_instrument_offsets
-from palpate.diagnosis.instrument.support_readings import rigid_of
+from palpate.diagnosis.instrument.free_air_offsets import InstrumentOffsets
+from palpate.diagnosis.instrument.instrument_effects import taken_off
+from palpate.diagnosis.instrument.readings import readings_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit, bounds_of, covariance
@@ -63,12 +62,10 @@ def calibrate_on_object(
     material = dataclasses.replace(model.material, young_modulus_pa=modulus_pa)
     model = model.replaced(material=material)
     presses = presses_on(recording, model)
-    touches = touches_of(presses)
-    free = free_air_of(recording, presses)
+    readings = readings_of(recording, presses, model.support.normal, fitted=False)
     progress("sites", 0.1)
-    forward = build_forward(touches, model)
-    rigid = rigid_of(recording, presses, model.support.normal)
-    offsets = find_instrument_offsets(forward, free, rigid, set())
+    forward = build_forward(readings.touches, model)
+    offsets = taken_off(readings, forward, ())
     nuisance = NuisanceOptions()
     search = Search(
         forward, modulus_pa, nuisance=nuisance, options=AttributionOptions(),

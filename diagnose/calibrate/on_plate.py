@@ -9,10 +9,9 @@ import numpy as np
 
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.recording.calibration import Calibration
-from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import delayed
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import low_pass
-from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 
 _DELAYS_S = np.arange(-0.04, 0.0401, 0.001)
 _BRISK, _TAKES_UP, _PRESSED = 0.2, 0.3, 0.1
@@ -26,9 +25,9 @@ _LAW_SD = (1e-3, 5e-6, 2e-4)
 (twenty drawn plates; `palpate bench calibrate`)."""
 
 
-def calibrate_on_plate(recording: Recording, exploration: Exploration) -> Calibration:
-    """exploration: its contacts with a rigid plate. Raises ContactError where no press goes in and out."""
-    presses = exploration.presses
+def calibrate_on_plate(measured: Measured) -> Calibration:
+    """measured: its contacts with a rigid plate. Raises ContactError where no press goes in and out."""
+    recording, presses = measured.recording, measured.presses
     normal = presses.contact_normal.mean(axis=0)
     normal /= np.linalg.norm(normal)
     plate = _plate_normal(presses.centre, normal)

@@ -21,11 +21,12 @@ from palpate.mechanics.progress import Clock
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.shape.nearest import distance
 from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.shapes.fit import LEAST_TOUCHES
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s1_filter.signals import filtered_of
 from palpate.reconstruction.steps.s1_filter.tool_weight import ToolWeight
-from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
 from palpate.reconstruction.steps.s4_surface import (
     Surface,
@@ -73,7 +74,7 @@ class ExplorationEstimate:
     each step of this update. covariance: (p, p) 1/m^2, of the sites' compliances by the shape's uncertainty.
     """
 
-    exploration: Exploration | None = None
+    exploration: Measured | None = None
     weight: ToolWeight | None = None
     surface: Surface | None = None
     solved: SolvedMesh | None = None
@@ -153,7 +154,7 @@ def modulus_of(
 
 
 def _surface(
-    exploration: Exploration, before: ExplorationEstimate, within_m: float | None
+    exploration: Measured, before: ExplorationEstimate, within_m: float | None
 ) -> tuple[Surface, int, float]:
     """(surface, presses at the last choice of a family, m within which 95 % of the surface lay by that)."""
     count = len(exploration.presses)

@@ -9,11 +9,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from palpate.diagnosis.instrument.jackknife import all_but_one, covariance
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.kinematics import acceleration
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import runs
+from palpate.mechanics.statistics import all_but_one, jackknife_covariance
 
 BLOCK_S = 0.25
 MIN_BLOCKS = 8
@@ -122,7 +122,7 @@ def _line(t: np.ndarray, values: np.ndarray, about: float) -> np.ndarray:
 
 def _scatter(lines: np.ndarray) -> tuple[float, float]:
     """Standard errors of level and slope, of the axis that scatters most; lines: (s, 2, 3)."""
-    spread = np.sqrt(np.diag(covariance(lines.reshape(len(lines), 6)))).reshape(2, 3).max(axis=1)
+    spread = np.sqrt(np.diag(jackknife_covariance(lines.reshape(len(lines), 6)))).reshape(2, 3).max(axis=1)
     return float(spread[0]), float(spread[1])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -73,7 +74,7 @@ class _FreeAirParts:
 
 
 def free_air_offsets(
-    forward: Forward, free: FreeAir | None, excluded: set[str], rules: AttributionOptions
+    forward: Forward, free: FreeAir | None, excluded: Collection[str], rules: AttributionOptions
 ) -> InstrumentOffsets:
     """Decide what free air shows, and take it off the forces of forward.touches."""
     t = forward.touches

@@ -7,14 +7,15 @@ It is taken off the forces and positions, so that the search for other effects s
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.instrument.free_air import FreeAir
 from palpate.diagnosis.instrument.free_air_offsets import InstrumentOffsets, around, free_air_offsets, matters
-from palpate.diagnosis.instrument.retraced import Move
-from palpate.diagnosis.instrument.support_readings import Rigid
+from palpate.diagnosis.instrument.readings import Readings
+from palpate.diagnosis.instrument.support_readings import Move, Rigid
 from palpate.diagnosis.options import AttributionOptions
 from palpate.mechanics.effects.backlash import EFFECT as PLAY
 from palpate.mechanics.effects.base import Effect
@@ -29,11 +30,19 @@ PLAY_GIVES = 0.05
 """Share by which a play's width may be another than the support shows."""
 
 
+def taken_off(
+    readings: Readings, forward: Forward, excluded: Collection[str], rules: AttributionOptions = RULES
+) -> InstrumentOffsets:
+    """All that the readings assert, taken off forces and positions of forward.touches."""
+    offsets = find_instrument_offsets(forward, readings.free, readings.rigid, excluded, rules)
+    return with_move(offsets, forward, readings.move, excluded, rules)
+
+
 def find_instrument_offsets(
     forward: Forward,
     free: FreeAir | None,
     rigid: Rigid | None,
-    excluded: set[str],
+    excluded: Collection[str],
     rules: AttributionOptions = RULES,
 ) -> InstrumentOffsets:
     """Decide what free air and the support show; take it off forces and positions of forward.touches."""
@@ -106,7 +115,7 @@ def with_move(
     offsets: InstrumentOffsets,
     forward: Forward,
     move: Move | None,
-    excluded: set[str],
+    excluded: Collection[str],
     rules: AttributionOptions = RULES,
 ) -> InstrumentOffsets:
     """The offsets, and the object's move where its base was traced twice and it shows.
@@ -137,7 +146,9 @@ def _shows_play(rigid: Rigid, rules: AttributionOptions) -> bool:
     return abs(rigid.play) > max(rules.z * rigid.play_error, LEAST_PLAY_M)
 
 
-def seen_play(rigid: Rigid | None, excluded: set[str], rules: AttributionOptions = RULES) -> Effect | None:
+def seen_play(
+    rigid: Rigid | None, excluded: Collection[str], rules: AttributionOptions = RULES
+) -> Effect | None:
     """A play that the support shows, its width held to what was read there: a free one would widen until it
     took a solid's memory in; else None."""
     if rigid is None or PLAY.name in excluded or not _shows_play(rigid, rules):

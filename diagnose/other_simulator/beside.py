@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from palpate.diagnosis.forward.touches import LEAST_PRESSES, LEAST_ROWS, reached, touches_of
+from palpate.diagnosis.forward.touches import LEAST_PRESSES, LEAST_ROWS, touches_of
 from palpate.diagnosis.numerics.base import signal_of
 from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.other_simulator.against_law import LEAST_SHARE, Numerics, numerics_of, seen_in_samples
@@ -14,7 +14,6 @@ from palpate.diagnosis.other_simulator.forces import Aligned
 from palpate.diagnosis.other_simulator.parts import law_at
 from palpate.diagnosis.other_simulator.stated import Stated, StatedForward
 from palpate.diagnosis.verdict.answer import Findings
-from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import MARGIN_S, Presses
 from palpate.mechanics.progress import Progress
 
@@ -33,9 +32,9 @@ class Sides:
     notes: tuple[str, ...]
 
 
-def beside(presses: Presses, model: Model, given: Aligned, findings: Findings, stated: Stated) -> Sides:
+def beside(given: Aligned, findings: Findings, stated: Stated) -> Sides:
     """The forces as touches, row by row beside the real ones."""
-    met = reached(presses) if model.fitted_to(presses) else np.ones(len(presses), dtype=bool)
+    presses, met = findings.readings.presses, findings.readings.met
     run = np.flatnonzero(given.usable)
     own = presses.rows(run)
     signal, seen = seen_in_samples(signal_of(presses.of(run), given.force[own]))

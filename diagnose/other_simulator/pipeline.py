@@ -28,7 +28,7 @@ from palpate.diagnosis.other_simulator.parts import (
 )
 from palpate.diagnosis.other_simulator.result import Part, SimulatedGap, Simulator, advice_of
 from palpate.diagnosis.other_simulator.stated import Stated
-from palpate.diagnosis.pipeline import diagnose, with_tip_of
+from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.search.gaps import closed_share_ci95
 from palpate.diagnosis.verdict.answer import Answer, Findings
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
@@ -84,7 +84,7 @@ def diagnose_simulated(
             recording, model, options, part(progress, 0.0, 0.6), nuisance=nuisance, attribution=attribution
         )
     findings: Findings = reality.findings
-    sides = beside(presses, with_tip_of(model, presses), given, findings, asked.stated)
+    sides = beside(given, findings, asked.stated)
     numerics = named_numerics(sides, rules, part(progress, 0.6, 0.95))
     result = _concluded(_weighed(asked, options, rules, reality, sides, numerics))
     progress("done", 1.0)
@@ -189,7 +189,7 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         noise_share=min(reality.noise_n**2 / whole, 1.0),
         touch_share=(w.square("parameters") - w.square("touches")) / whole,
         where=locate(
-            forward, w.gaps["simulated"], findings.free, findings.site_sd[kept],
+            forward, w.gaps["simulated"], findings.readings.free, findings.site_sd[kept],
             (w.gaps["simulated"] ** 2).sum(axis=1), seed=w.seed,
         ),
         entries=_entries(w, names),

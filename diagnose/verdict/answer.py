@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
-from palpate.diagnosis.instrument.free_air import FreeAir
-from palpate.diagnosis.instrument.instrument_effects import InstrumentOffsets
+from palpate.diagnosis.instrument.free_air_offsets import InstrumentOffsets
+from palpate.diagnosis.instrument.readings import Readings
 from palpate.diagnosis.search.attribution import Attribution
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit, settings_of
@@ -26,7 +26,7 @@ class Findings:
     forward: Forward
     search: Search
     found: Attribution
-    free: FreeAir | None
+    readings: Readings
     instrument_offsets: InstrumentOffsets
     site_sd: np.ndarray
     excluded: frozenset[str]

@@ -135,7 +135,7 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
         effects=tuple(answer.names),
         candidates=tuple(dict.fromkeys(answer.candidates)),
         where=locate(
-            forward, residual_before, findings.free, findings.site_sd, stated_gap(findings, answer),
+            forward, residual_before, findings.readings.free, findings.site_sd, stated_gap(findings, answer),
             seed=findings.seed,
         ),
         entries=entries_of(findings, answer, gaps, counts, rng),
@@ -147,7 +147,7 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
         held_out_n=gaps.held,
         forward=forward,
         attribution=found,
-        free_air=findings.free,
+        free_air=findings.readings.free,
         residual_before=residual_before,
         residual_after=found.final.residual,
         findings=findings,

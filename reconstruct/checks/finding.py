@@ -18,7 +18,6 @@ from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import Result
-from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 
 SURE_P = 1e-6
 """A statistic's probability on a sound recording must be below this before it makes a finding."""
@@ -124,13 +123,13 @@ class ReconstructionOutcome:
 
 
 def outcome_of(
-    presses: Presses, modulus_pa: float, ci95_pa: tuple[float, float], fit: ModulusFit | None
+    presses: Presses, modulus_pa: float, ci95_pa: tuple[float, float], misfit_n: np.ndarray | None
 ) -> ReconstructionOutcome:
-    """Of fitted presses; the paper's method (no fit) states no misfit."""
+    """Of fitted presses; misfit_n: (p,) N rms, None by the paper's method, which states none."""
     net, touched = presses.net, presses.press[presses.counted]
     squared = np.bincount(touched, (net.force[presses.counted] ** 2).sum(axis=1), len(presses))
     force = np.sqrt(squared / np.maximum(np.bincount(touched, minlength=len(presses)), 1))
-    misfit = np.full(len(presses), np.nan) if fit is None else fit.press.rms_n
+    misfit = np.full(len(presses), np.nan) if misfit_n is None else misfit_n
     return ReconstructionOutcome(modulus_pa, ci95_pa, misfit, force, presses.onset_s)
 
 

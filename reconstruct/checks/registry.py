@@ -6,14 +6,13 @@ What is wrong with units is mended for the checks that follow, so that one fault
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from palpate.mechanics.errors import ContactError, NoBaseError, RecordingError
-from palpate.mechanics.model.files import read_model
 from palpate.mechanics.plausible import EXPLORATION
-from palpate.mechanics.recording.recording import Recording, base_model_of
+from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.checks.air import air, delay
 from palpate.reconstruction.checks.channels import channels
 from palpate.reconstruction.checks.clock import clock
@@ -22,13 +21,15 @@ from palpate.reconstruction.checks.handedness import handedness
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
 from palpate.reconstruction.checks.units import measured, settled
-from palpate.reconstruction.geometry.stated import GeometryOptions, base_of_model, stated_geometry
+from palpate.reconstruction.geometry.stated import GeometryOptions, over_its_base, stated_geometry
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
-from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
+from palpate.reconstruction.steps.s3_contacts.quasi_static import is_points
 
 OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
-OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)
+OF_PRESSES: tuple[Callable[[Measured], Iterator[Finding]], ...] = (support, dropped)
 OF_RESULTS: tuple[Callable[[ReconstructionOutcome], Iterator[Finding]], ...] = (outcome,)
 REFUSALS = ("no base", "no presses")
 """Findings that say where reconstruction itself stops, fault or not."""
@@ -57,7 +58,7 @@ def checked_samples(
     by_hand: a hand explored a whole object. Otherwise (a slab under an indenter) only the force's direction
     is looked at, as sizes, speeds and channels that stand still may be anything. cutoff_hz: of the low-pass.
     """
-    if recording.description.get("recording", {}).get("quasi_static"):
+    if is_points(recording):
         return CheckedSamples()
     if len(recording.t) < _LEAST_SAMPLES:
         return CheckedSamples((_too_short(recording),) if by_hand else ())
@@ -68,7 +69,7 @@ def checked_samples(
     return CheckedSamples(ordered([*found, *(f for check in OF_SAMPLES for f in check(data))]), data)
 
 
-def checked_presses(exploration: Exploration) -> tuple[Finding, ...]:
+def checked_presses(exploration: Measured) -> tuple[Finding, ...]:
     """What base and presses show."""
     return ordered(f for check in OF_PRESSES for f in check(exploration))
 
@@ -96,23 +97,14 @@ def looked_at(recording: Recording) -> tuple[tuple[Finding, ...], Seen]:
 def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[Finding, ...]:
     found = samples.found
     try:
-        exploration = _explored(recording, samples.spans)
+        exploration = over_its_base(
+            recording, lambda base: explore(recording, boundary=base, spans=samples.spans)
+        )
     except NoBaseError as error:
         return ordered([*found, _refused(recording, "no base", error)])
     except ContactError as error:
         return ordered([*found, _refused(recording, "no presses", error)])
     return ordered([*found, *checked_presses(exploration)])
-
-
-def _explored(recording: Recording, spans: ContactSpans | None) -> Exploration:
-    """As reconstruction finds the presses: where no base is traced, over that of the model it names."""
-    try:
-        return explore(recording, spans=spans)
-    except NoBaseError:
-        if recording.base_model is None:
-            raise
-    base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
-    return explore(recording, boundary=base, spans=spans)
 
 
 Seen = tuple[tuple[str, float, float], ...]
@@ -144,42 +136,22 @@ def seen(data: Samples | None) -> Seen:
     )
 
 
-class CheckupRun:
-    """The check-up beside a reconstruction: each stage refuses what is grave, unless `force`.
+def refuse_grave(found: Iterable[Finding], force: bool = False) -> None:
+    """Raises RecordingError where a finding is grave, unless `force`."""
+    grave = [f for f in found if f.grave]
+    if grave and not force:
+        first, more = grave[0], f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
+        raise RecordingError(
+            f"{first.name}: {first.saw}{more}; {first.todo}; `palpate check REC --report PAGE` shows "
+            "where, `palpate reconstruct --force` goes on despite it"
+        )
 
-    found: what the stages so far have found. spans: contacts that need not be found again, None where
-    reconstruction would see others. Every stage raises RecordingError.
-    """
 
-    def __init__(
-        self,
-        recording: Recording,
-        force: bool = False,
-        by_hand: bool = True,
-        cutoff_hz: float = FilterOptions.cutoff_hz,
-    ) -> None:
-        self._force = force
-        samples = checked_samples(recording, by_hand, cutoff_hz)
-        self.found, self.spans = self._judged(samples.found), samples.spans
-
-    def presses(self, exploration: Exploration) -> None:
-        """Before a surface is made."""
-        self.found = ordered([*self.found, *self._judged(checked_presses(exploration))])
-
-    def interval(self, result: ReconstructionOutcome) -> tuple[float, float]:
-        """Before the modulus is believed: its 95 % interval, Pa, as wide as the findings make it."""
-        self.found = ordered([*self.found, *self._judged(checked_results(result))])
-        return widened(result.modulus_pa, result.ci95_pa, self.found)
-
-    def _judged(self, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
-        grave = [f for f in found if f.grave]
-        if grave and not self._force:
-            first, more = grave[0], f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
-            raise RecordingError(
-                f"{first.name}: {first.saw}{more}; {first.todo}; `palpate check REC --report PAGE` shows "
-                "where, `palpate reconstruct --force` goes on despite it"
-            )
-        return found
+def with_findings(exploration: Measured, found: Iterable[Finding], force: bool = False) -> Measured:
+    """With what one more stage of the check-up has found. Raises RecordingError as `refuse_grave`."""
+    found = tuple(found)
+    refuse_grave(found, force)
+    return replace(exploration, findings=ordered([*exploration.findings, *found]))
 
 
 def widened(modulus_pa: float, ci95_pa: tuple[float, float], found: Iterable[Finding]) -> tuple[float, float]:

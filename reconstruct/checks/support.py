@@ -8,7 +8,7 @@ import numpy as np
 
 from palpate.mechanics.statistics import spread_about_zero, weighted_median
 from palpate.reconstruction.checks.finding import Finding
-from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s3_contacts.on_support import supported
 
 _BELOW = 6.0
@@ -21,24 +21,24 @@ _STEEP = 0.85
 """A wall's normal rises from the horizontal by less than this cosine."""
 
 
-def support(exploration: Exploration) -> Iterator[Finding]:
+def support(measured: Measured) -> Iterator[Finding]:
     """A tip below the support; a base of another size than the walls that stand on it."""
-    boundary = exploration.boundary
+    boundary = measured.boundary
     if not boundary.interval[1] > boundary.interval[0]:
         return
-    yield from _below(exploration)
-    yield from _hollow(exploration)
-    yield from _size(exploration)
+    yield from _below(measured)
+    yield from _hollow(measured)
+    yield from _size(measured)
 
 
-def _below(exploration: Exploration) -> Iterator[Finding]:
-    recording, boundary = exploration.recording, exploration.boundary
+def _below(measured: Measured) -> Iterator[Finding]:
+    recording, boundary = measured.recording, measured.boundary
     radius = recording.tip_radius_m
-    height = boundary.height(exploration.position) - radius
+    height = boundary.height(measured.position) - radius
     height[: boundary.interval[1]] = 0.0
     least = max(_BELOW * boundary.flatness_m, 0.1 * radius, 10 * (recording.position_resolution_m or 0.0))
     # a tool that yields is pressed below what is rigid, and a base traced once more is where it has gone
-    below = (height < -least) & ~supported(exploration.presses, recording.t)
+    below = (height < -least) & ~supported(measured.presses, recording.t)
     if not below.any():
         return
     deepest = int(np.argmin(np.where(below, height, 0.0)))
@@ -59,14 +59,14 @@ def _below(exploration: Exploration) -> Iterator[Finding]:
     )
 
 
-def _hollow(exploration: Exploration) -> Iterator[Finding]:
+def _hollow(measured: Measured) -> Iterator[Finding]:
     """A tip goes round a base on a wider path than itself: what it goes round has a size."""
-    boundary, radius = exploration.boundary, exploration.recording.tip_radius_m
+    boundary, radius = measured.boundary, measured.recording.tip_radius_m
     path = boundary.centres - boundary.centres.mean(axis=0)
     reach = float(np.median(np.linalg.norm(path, axis=1)))
     if reach > 1.2 * radius:
         return
-    t, (a, b) = exploration.recording.t, boundary.interval
+    t, (a, b) = measured.recording.t, boundary.interval
     yield Finding(
         "tip radius",
         f"the tip went round the base on a path of radius {reach * 1e3:.3g} mm, and its own radius is "
@@ -80,10 +80,10 @@ def _hollow(exploration: Exploration) -> Iterator[Finding]:
     )
 
 
-def _size(exploration: Exploration) -> Iterator[Finding]:
+def _size(measured: Measured) -> Iterator[Finding]:
     """The base ends no farther in than what bulges over it, and no farther out than walls lead along their
     slope: where a wall is upright the two are one."""
-    boundary, presses = exploration.boundary, exploration.presses
+    boundary, presses = measured.boundary, measured.presses
     up = boundary.support_normal
     rise = presses.contact_normal @ up
     height = boundary.height(presses.point)
@@ -116,7 +116,7 @@ def _size(exploration: Exploration) -> Iterator[Finding]:
     error = 1.25 * max(spread_about_zero(ratio - centre), 0.05) / np.sqrt(wall.sum())
     if abs(centre) < np.log(_SCALE) + _CERTAIN * error:
         return
-    t, (a, b) = exploration.recording.t, boundary.interval
+    t, (a, b) = measured.recording.t, boundary.interval
     yield Finding(
         "base size",
         f"the walls that were pressed stand {np.exp(centre):.2f} times as far out as the traced base",
@@ -129,17 +129,17 @@ def _size(exploration: Exploration) -> Iterator[Finding]:
     )
 
 
-def dropped(exploration: Exploration) -> Iterator[Finding]:
+def dropped(measured: Measured) -> Iterator[Finding]:
     """Contacts that were not used, and why, where they are many."""
-    used, lost = len(exploration.presses), exploration.rejected
+    used, lost = len(measured.presses), measured.rejected
     # what is over in an instant was never meant as a press
     lost = tuple((t, why) for t, why in lost if not why.startswith("lasts only"))
-    t, size = exploration.recording.t, np.linalg.norm(exploration.force, axis=1)
+    t, size = measured.recording.t, np.linalg.norm(measured.force, axis=1)
 
     def peak(start: float) -> float:
         return float(size[slice(*np.searchsorted(t, [start, start + _PRESS_S]))].max(initial=0.0))
 
-    least = _FEEBLE * float(np.median([peak(at) for at in exploration.presses.onset_s]))
+    least = _FEEBLE * float(np.median([peak(at) for at in measured.presses.onset_s]))
     lost = tuple((at, why) for at, why in lost if peak(at) > least)
     if len(lost) < 3 or len(lost) < 0.25 * (used + len(lost)):
         return
@@ -155,7 +155,7 @@ def dropped(exploration: Exploration) -> Iterator[Finding]:
         "press longer, harder and from the air; look at the named ones",
         float(0.05 + 0.1 * share),
         np.inf,
-        (max(first - 0.5, float(exploration.recording.t[0])), first + 1.0),
+        (max(first - 0.5, float(measured.recording.t[0])), first + 1.0),
         ("fx", "fy", "fz"),
     )
 

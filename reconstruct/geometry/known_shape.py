@@ -15,7 +15,6 @@ from palpate.mechanics.disk.surface_files import ClosedSurface, read_surface
 from palpate.mechanics.errors import ContactError, SurfaceError
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.shape.flat_foot import Standing, standing
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.shape.true_shape import TrueShape
@@ -28,10 +27,10 @@ from palpate.reconstruction.geometry.registration import (
 )
 from palpate.reconstruction.geometry.slab import place_slab
 from palpate.reconstruction.geometry.stated import GeometryOptions, Placed, base_of_rim, foot_rim
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.shapes.drawing import decimated
 from palpate.reconstruction.shapes.polyhedron import refine
 from palpate.reconstruction.steps.s2_base import BoundaryOptions
-from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError
 
@@ -45,8 +44,7 @@ _FAR = 0.1
 
 
 def place(
-    recording: Recording,
-    first: Exploration,
+    first: Measured,
     options: GeometryOptions,
     *,
     mesh_size_m: float,
@@ -70,7 +68,7 @@ def place(
     found = register(body, touched, free=options.pose == "auto")
     progress("registration", 1.0)
     _check(given, found, options)
-    placed = _placed(given, stood, found, options, spacing_m, recording.tip_radius_m)
+    placed = _placed(given, stood, found, options, spacing_m, presses.tip_radius_m)
     return dataclasses.replace(placed, doubt=_doubt(given, found, touched, free=options.pose == "auto"))
 
 
@@ -85,7 +83,7 @@ def _touched(presses: Presses, support: tuple[np.ndarray, np.ndarray] | None) ->
     )
 
 
-def _traced_support(first: Exploration) -> tuple[np.ndarray, np.ndarray] | None:
+def _traced_support(first: Measured) -> tuple[np.ndarray, np.ndarray] | None:
     """The support of a recording that traces it all the same; None where it does not."""
     if first.spans is None:
         return None

@@ -8,19 +8,21 @@ Which geometry is known: by options, or by what the recording says of its object
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from palpate.mechanics.disk.surface_files import UNITS
-from palpate.mechanics.errors import ContactError, OptionError
+from palpate.mechanics.errors import ContactError, NoBaseError, OptionError
 from palpate.mechanics.frames import support_axes, tangents
+from palpate.mechanics.model.files import read_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.options import option
-from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.recording import Recording, base_model_of
 from palpate.mechanics.shape.tetmesh import TetMesh
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError
@@ -84,6 +86,19 @@ def base_of_model(model: Model, tip_radius_m: float) -> Boundary:
             "reconstruct that model with a finer --mesh-size"
         )
     return base_of_rim(rim, model.support.point, model.support.normal, tip_radius_m)
+
+
+def over_its_base(recording: Recording, found: Callable[[Boundary | None], Measured]) -> Measured:
+    """What is found over the base that was traced (None); where none was, over that of [object] model = PATH.
+
+    Raises NoBaseError where no model is stated either.
+    """
+    try:
+        return found(None)
+    except NoBaseError:
+        if recording.base_model is None:
+            raise
+    return found(base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m))
 
 
 def base_of_rim(rim: np.ndarray, point: np.ndarray, normal: np.ndarray, tip_radius_m: float) -> Boundary:

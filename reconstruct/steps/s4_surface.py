@@ -42,7 +42,7 @@ from palpate.reconstruction.shapes.polyhedron import (
 )
 
 if TYPE_CHECKING:
-    from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
+    from palpate.reconstruction.measured import Measured
 
 
 @dataclass(frozen=True)
@@ -188,12 +188,12 @@ class Surface:
         return float(self.mesh.volume)
 
 
-def evidence_of(exploration: Exploration) -> Evidence:
+def evidence_of(measured: Measured) -> Evidence:
     """What an exploration says about the shape; touches known far less well than most are left out.
 
     Raises SurfaceError where it has no base outline.
     """
-    boundary, presses = exploration.boundary, exploration.presses
+    boundary, presses = measured.boundary, measured.presses
     if boundary is None:
         raise SurfaceError(
             "the recording has no base outline: trace the base or give a model whose base stands in"
@@ -210,7 +210,7 @@ def evidence_of(exploration: Exploration) -> Evidence:
         normals=presses.contact_normal[good],
         centre_error_m=error[good],
         site=presses.site[good],
-        tip_radius_m=exploration.recording.tip_radius_m,
+        tip_radius_m=measured.recording.tip_radius_m,
     )
 
 

@@ -81,7 +81,7 @@ def calibrate(asked: CalibrateOperands, call: Call) -> Calibration:
     with call.progress("calibrate") as tell:
         if asked.modulus_pa is None:
             found = explore(measured, boundary=nowhere(measured), unbroken=True)
-            result = calibrate_on_plate(measured, found)
+            result = calibrate_on_plate(found)
         else:
             made = reconstruct(
                 measured,

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 from palpate.diagnosis.forward.prediction import build_forward
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.instrument.instrument_effects import InstrumentOffsets, ruled_out, with_move
-from palpate.diagnosis.instrument.retraced import Move, move_of
-from palpate.diagnosis.instrument.support_readings import Rigid
+from palpate.diagnosis.instrument.support_readings import Move, Rigid, move_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.verdict.next_touch import next_touch

@@ -52,7 +52,7 @@ def on_plate(stiffness: float, play_m: float, delay_s: float, bias: np.ndarray, 
 def test_a_rigid_plate_tells_stiffness_play_and_delay(stiffness, play_m, delay_s):
     bias = np.array([0.03, -0.02, 0.05])
     recording = on_plate(stiffness, play_m, delay_s, bias)
-    found = calibrate_on_plate(recording, explore(recording, boundary=nowhere(recording), unbroken=True))
+    found = calibrate_on_plate(explore(recording, boundary=nowhere(recording), unbroken=True))
     assert found.stiffness_n_per_m == pytest.approx(stiffness, rel=0.05)
     assert (found.play_m or 0.0) == pytest.approx(play_m, abs=3e-5)
     assert (found.delay_s or 0.0) == pytest.approx(delay_s, abs=2e-3)
@@ -65,7 +65,7 @@ def test_a_rigid_plate_tells_stiffness_play_and_delay(stiffness, play_m, delay_s
 def test_a_soft_object_is_no_rigid_plate():
     recording = read_recording(embedded_recording())
     with pytest.raises(ContactError, match="differs from press to press"):
-        calibrate_on_plate(recording, explore(recording, boundary=nowhere(recording), unbroken=True))
+        calibrate_on_plate(explore(recording, boundary=nowhere(recording), unbroken=True))
 
 
 def test_a_recording_that_names_a_calibration_is_read_as_an_ideal_instrument_had(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 
 from palpate.mechanics.errors import PalpateError, RecordingError
 from palpate.reconstruction.checks.finding import Finding, ReconstructionOutcome, decades_of_tail, outcome
-from palpate.reconstruction.checks.registry import CheckupRun, check, checked_samples, widened
+from palpate.reconstruction.checks.registry import check, checked_samples, refuse_grave, widened
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.units import measured
 
@@ -88,11 +88,12 @@ def test_the_delay_of_the_force_is_read_off_places_passed_twice(cylinder):
 def test_grave_findings_refuse_unless_forced(cylinder):
     flipped = dataclasses.replace(cylinder[0], force_on_tool=-cylinder[0].force_on_tool)
     with pytest.raises(RecordingError, match="force sign: .*force_on.*--force"):
-        CheckupRun(flipped)
-    (finding, *_) = CheckupRun(flipped, force=True).found
+        refuse_grave(checked_samples(flipped).found)
+    (finding, *_) = found = checked_samples(flipped).found
+    refuse_grave(found, force=True)
     assert finding.name == "force sign" and "--force-on object" in finding.todo
     stated = dataclasses.replace(flipped, description={"recording": {"force_on": "object"}})
-    assert "--force-on tool" in CheckupRun(stated, force=True).found[0].todo
+    assert "--force-on tool" in checked_samples(stated).found[0].todo
 
 
 def test_lesser_findings_widen_the_interval():

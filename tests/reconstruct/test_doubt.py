@@ -47,7 +47,7 @@ def touches():
 def test_first_touches_tell_another_objects_shape(touches, tmp_path, name):
     recording, found = touches
     options = GeometryOptions(shape=stl(tmp_path, name), unit="m")
-    put = place(recording, found, options, mesh_size_m=0.01, spacing_m=0.003)
+    put = place(found, options, mesh_size_m=0.01, spacing_m=0.003)
     if name in ("right", "two per cent too large"):
         assert put.doubt == ""
     else:

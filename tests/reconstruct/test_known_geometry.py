@@ -48,7 +48,7 @@ def test_presses_are_found_without_tracing_in_any_frame(ground):
 
 def test_a_slabs_top_goes_through_the_first_touches(ground):
     recording, found = ground
-    put = place(recording, found, GeometryOptions(slab_m=0.02), mesh_size_m=0.01, spacing_m=0.003)
+    put = place(found, GeometryOptions(slab_m=0.02), mesh_size_m=0.01, spacing_m=0.003)
     up = put.base.support_normal
     truth = found.presses.contact_normal.mean(axis=0)
     assert up @ truth / np.linalg.norm(truth) > np.cos(np.radians(1.0))
@@ -62,7 +62,7 @@ def test_a_slabs_top_goes_through_the_first_touches(ground):
 def test_a_slab_thinner_than_its_presses_are_deep_is_refused(ground, slab_m, words):
     recording, found = ground
     with pytest.raises(SurfaceError, match=words):
-        place(recording, found, GeometryOptions(slab_m=slab_m), mesh_size_m=0.01, spacing_m=0.003)
+        place(found, GeometryOptions(slab_m=slab_m), mesh_size_m=0.01, spacing_m=0.003)
 
 
 def test_touches_at_one_place_leave_nothing_out_and_crash_nothing():

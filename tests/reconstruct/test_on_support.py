@@ -12,7 +12,8 @@ from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import TimeSegment
 from palpate.reconstruction.checks.support import support
 from palpate.reconstruction.geometry.stated import nowhere
-from palpate.reconstruction.steps.s3_contacts.contacts import Exploration, explore
+from palpate.reconstruction.measured import Measured
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.left_out import on_base
 
 
@@ -67,7 +68,7 @@ def test_half_a_round_is_no_tracing(cylinder):
     assert [f for f in support(found) if f.name == "below the support"]
 
 
-def _with_rigid(recording: Recording, plain: Exploration, yields_m: float = 0.0) -> Recording:
+def _with_rigid(recording: Recording, plain: Measured, yields_m: float = 0.0) -> Recording:
     """The recording with three presses on the bare support, 30 mm beside the base, into which a tool that
     yields goes so deep."""
     base, normal = plain.boundary, plain.boundary.support_normal

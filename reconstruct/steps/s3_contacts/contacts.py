@@ -7,7 +7,7 @@ thresholds from the sensor's noise, every press used, first touch by fitting the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,8 +15,8 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import option
 from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
 from palpate.mechanics.presses.repeats import SITE_M
-from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.shapes.fit import LEAST_TOUCHES
 from palpate.reconstruction.steps.s1_filter.noise import (
     FilterOptions,
@@ -84,33 +84,6 @@ class ContactOptions:
             raise OptionError(f"--site-size is {self.site_m} m; it must be greater than 0")
 
 
-@dataclass(frozen=True)
-class Exploration:
-    """Everything read off a recording before any shape: both phases, filtered signals, noise, the presses.
-
-    recording: as given. position, force: (n, 3) low-passed, force on the tool with the free-air force taken
-    off and read earlier by delay_s, as late as it comes (standard error: delay_error_s).
-    noise_n: standard deviation of the raw force an axis. presses: the table, forces in it as read; places and
-    normals those of the touches themselves. rejected: (t, reason) of contacts not used. threshold_n: tau.
-    method: 'noise' or 'paper'. dropped: corrections that were not made, and why. spans: of all contacts, None
-    for points without a time.
-    """
-
-    recording: Recording
-    position: np.ndarray
-    force: np.ndarray
-    noise_n: float
-    boundary: Boundary
-    presses: Presses
-    rejected: tuple[tuple[float, str], ...]
-    threshold_n: float
-    method: str
-    delay_s: float = 0.0
-    delay_error_s: float = 0.0
-    dropped: tuple[str, ...] = ()
-    spans: ContactSpans | None = field(default=None, repr=False, compare=False)
-
-
 def explore(
     recording: Recording,
     *,
@@ -121,7 +94,7 @@ def explore(
     boundary: Boundary | None = None,
     spans: ContactSpans | None = None,
     unbroken: bool = False,
-) -> Exploration:
+) -> Measured:
     """Phases, support, base outline and palpations of a recording.
 
     boundary: a known base, for recordings without phase I. spans: of this recording at this cutoff, where
@@ -209,7 +182,7 @@ def _tabled(
     method: str,
     options: ContactOptions,
     delay: tuple[float, float] = (0.0, 0.0),
-) -> Exploration:
+) -> Measured:
     """The table of what was found; first touches carry what the delay's error moves them by.
 
     delay: s, and its standard error.
@@ -240,7 +213,7 @@ def _tabled(
         ),
         site_m=options.site_m,
     )
-    return Exploration(
+    return Measured(
         recording=recording,
         position=signals.position,
         force=signals.force,

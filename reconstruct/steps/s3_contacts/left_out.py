@@ -15,9 +15,9 @@ from palpate.mechanics.errors import ContactError
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.segments import TimeSegment
 from palpate.mechanics.statistics import spread_about_zero
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contact_law import contact_law, fit_offset, fit_rise
-from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 from palpate.reconstruction.steps.s3_contacts.on_support import on_it
 
 SLIDE_RADII = 8.0
@@ -38,31 +38,31 @@ def sliding(presses: Presses) -> np.ndarray:
     return far > SLIDE_RADII * presses.tip_radius_m
 
 
-def without_slides(exploration: Exploration, least: int) -> Exploration:
-    """The exploration without the presses that slide; their stretches become segments 'slide'.
+def without_slides(measured: Measured, least: int) -> Measured:
+    """What was measured, without the presses that slide; their stretches become segments 'slide'.
 
     Raises ContactError where fewer than `least` presses are left.
     """
     reason = f"slides over the surface by more than {SLIDE_RADII:g} tip radii"
-    slides = sliding(exploration.presses)
+    slides = sliding(measured.presses)
     left = int((~slides).sum())
     if slides.any() and left < least:
         raise ContactError(
             f"{left} presses are left beside {int(slides.sum())} contacts that slide over the surface; at "
             f"least {least} are needed: a slide has no first touch of its place, so press as well"
         )
-    return _without(exploration, np.where(slides, reason, "").tolist(), "slide")
+    return _without(measured, np.where(slides, reason, "").tolist(), "slide")
 
 
-def on_base(exploration: Exploration, base: Boundary, least: int) -> Exploration:
-    """The exploration over a base that its own touches placed: without presses whose tip came down to it.
+def on_base(measured: Measured, base: Boundary, least: int) -> Measured:
+    """What was measured, over a base that its own touches placed: without presses whose tip came down to it.
 
     Raises ContactError where fewer than `least` presses are left.
     """
-    presses, t = exploration.presses, exploration.recording.t
+    presses, t = measured.presses, measured.recording.t
     spans = np.searchsorted(t, np.column_stack([presses.onset_s, presses.end_s])) + [0, 1]
     reasons = [
-        on_it(exploration.position[a:b], base, presses.tip_radius_m) if kind == "press" else ""
+        on_it(measured.position[a:b], base, presses.tip_radius_m) if kind == "press" else ""
         for (a, b), kind in zip(spans, presses.kinds, strict=True)
     ]
     left = reasons.count("")
@@ -71,21 +71,21 @@ def on_base(exploration: Exploration, base: Boundary, least: int) -> Exploration
             f"{left} presses are left beside {len(reasons) - left} on the support of the known geometry; at "
             f"least {least} are needed: press the object, or check --unit, --pose and --up"
         )
-    return _without(dataclasses.replace(exploration, boundary=base), reasons, None)
+    return _without(dataclasses.replace(measured, boundary=base), reasons, None)
 
 
-def within_slab(exploration: Exploration, thickness_m: float | None) -> Exploration:
-    """The exploration without the few presses that would go through the slab that it lies on; as it is where
-    they are not few: then the thickness is wrong."""
-    presses = exploration.presses
+def within_slab(measured: Measured, thickness_m: float | None) -> Measured:
+    """What was measured, without the few presses that would go through the slab that it lies on; as it is
+    where they are not few: then the thickness is wrong."""
+    presses = measured.presses
     through = presses.depth_m >= (thickness_m or np.inf)
     if through.mean() >= 0.5:
-        return exploration
+        return measured
     reasons = [
         f"goes {1e3 * depth:.1f} mm deep, through the slab" if out else ""
         for depth, out in zip(presses.depth_m, through, strict=True)
     ]
-    return _without(exploration, reasons, None)
+    return _without(measured, reasons, None)
 
 
 def off_surface(presses: Presses, points: np.ndarray, normals: np.ndarray, base: Boundary) -> list[str]:
@@ -126,14 +126,14 @@ def _offset(presses: Presses, p: int, point: np.ndarray, normal: np.ndarray) -> 
 
 
 def on_surface(
-    exploration: Exploration, points: np.ndarray, normals: np.ndarray, least: int
-) -> tuple[Exploration, np.ndarray]:
-    """The exploration without the presses that are not on the surface (`off_surface`), and which (p,) bool of
-    those before are left.
+    measured: Measured, points: np.ndarray, normals: np.ndarray, least: int
+) -> tuple[Measured, np.ndarray]:
+    """What was measured, without the presses that are not on the surface (`off_surface`), and which (p,) bool
+    of those before are left.
 
     Raises ContactError where fewer than `least` presses are left.
     """
-    reasons = off_surface(exploration.presses, points, normals, exploration.boundary)
+    reasons = off_surface(measured.presses, points, normals, measured.boundary)
     kept = np.array([not reason for reason in reasons])
     if kept.sum() < min(least, len(kept)):
         first = next(reason for reason in reasons if reason)
@@ -141,15 +141,15 @@ def on_surface(
             f"{int(kept.sum())} presses of {len(kept)} lie on the surface (one that does not {first}); at "
             f"least {least} are needed: check the position's frame, force_on and what the object lies on"
         )
-    return _without(exploration, reasons, None), kept
+    return _without(measured, reasons, None), kept
 
 
-def _without(exploration: Exploration, reasons: list[str], kind: str | None) -> Exploration:
+def _without(measured: Measured, reasons: list[str], kind: str | None) -> Measured:
     """Without the presses that have a reason; their stretches become segments of a kind, None: are no
     segments any more."""
-    presses, out = exploration.presses, np.array([bool(r) for r in reasons])
+    presses, out = measured.presses, np.array([bool(r) for r in reasons])
     if not out.any():
-        return exploration
+        return measured
     starts = set(presses.onset_s[out].tolist())
     segments = []
     for s in presses.segments:
@@ -159,6 +159,4 @@ def _without(exploration: Exploration, reasons: list[str], kind: str | None) -> 
             segments.append(TimeSegment(kind, s.start_s, s.end_s))
     kept = dataclasses.replace(presses.of(~out), segments=tuple(segments))
     refused = [(float(t), r) for t, r in zip(presses.onset_s, reasons, strict=True) if r]
-    return dataclasses.replace(
-        exploration, presses=kept, rejected=tuple(sorted([*exploration.rejected, *refused]))
-    )
+    return dataclasses.replace(measured, presses=kept, rejected=tuple(sorted([*measured.rejected, *refused])))

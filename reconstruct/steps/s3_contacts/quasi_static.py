@@ -21,9 +21,10 @@ from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.statistics import spread_about_zero
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contact_law import Loading, first_touches
-from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, Exploration
+from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions
 
 _LEAST_NOISE = 1e-3
 """Of the greatest force: noise below this is not believed."""
@@ -48,7 +49,7 @@ class _Group:
     loading: Loading
 
 
-def explore_points(recording: Recording, boundary: Boundary, options: ContactOptions) -> Exploration:
+def explore_points(recording: Recording, boundary: Boundary, options: ContactOptions) -> Measured:
     """The presses of a recording of points, in the order of its rows, over a known base.
 
     Raises ContactError where fewer places than options.least_palpations can be used.
@@ -85,7 +86,7 @@ def explore_points(recording: Recording, boundary: Boundary, options: ContactOpt
             "more"
         ) from wrong
     presses = _tabled(recording, strong, shift, error, noise, options)
-    return Exploration(
+    return Measured(
         recording=recording,
         position=position,
         force=force,

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.model.model import Model
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.pipeline import Reconstruction
-from palpate.reconstruction.steps.s3_contacts.contacts import Exploration
 from palpate.reconstruction.steps.s6_one_d import profiles
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import nearest_nodes
 from palpate.render.surface.felt_surface import felt_surface
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def force_over_time(ax: Axes, exploration: Exploration) -> Axes:
+def force_over_time(ax: Axes, exploration: Measured) -> Axes:
     """Figure 2: force magnitude (N) over time (s), first touches (o), peaks (+), phase I shaded."""
     t = exploration.recording.t
     force = np.linalg.norm(exploration.force, axis=1)
@@ -40,7 +40,7 @@ def force_over_time(ax: Axes, exploration: Exploration) -> Axes:
     return ax
 
 
-def touched_points(ax: Axes, exploration: Exploration) -> Axes:
+def touched_points(ax: Axes, exploration: Measured) -> Axes:
     """Figure 3(a): first touches (+), base outline, its farthest-point sample (o); parallel projection,
     mm."""
     boundary = exploration.boundary

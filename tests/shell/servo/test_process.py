@@ -32,7 +32,7 @@ ANSWER_S, STALE_S = 10.0, 2.0
 
 @pytest.fixture(autouse=True)
 def with_the_benchmarks_planes(monkeypatch):
-    """The servo's process makes what these tests feel, which lies in the clone and not in what is installed."""
+    """The servo process makes what these tests feel, which lies in the clone, not in what is installed."""
     monkeypatch.setenv("PYTHONPATH", str(REPOSITORY))
 
 
