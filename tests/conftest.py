@@ -6,8 +6,9 @@ import ast
 import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -22,7 +23,10 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 from palpate.mechanics.kernel_cache import sources  # noqa: E402  mechanics chooses where kernels are kept, before a test decorates one
 
-from .support.once import compile_one_at_a_time, one_at_a_time  # noqa: E402
+from .support.once import compile_one_at_a_time, folder_made_once, one_at_a_time  # noqa: E402
+
+if TYPE_CHECKING:
+    from palpate.mechanics.model.model import Model
 
 WORKER = "PYTEST_XDIST_WORKER" in os.environ and os.name == "posix"
 if WORKER:
@@ -101,9 +105,44 @@ def shared_recordings() -> Path:
 
 
 @pytest.fixture(scope="session")
+def reconstructed(
+    shared_recordings: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str], Model]:
+    """The MODEL of a labelled recording by default options: each is made once."""
+    from palpate.mechanics.model.files import read_model, write_model
+    from palpate.mechanics.recording.recording import read_recording
+    from palpate.reconstruction.pipeline import reconstruct
+
+    def model(name: str) -> Model:
+        def make(folder: Path) -> None:
+            write_model(folder / "MODEL", reconstruct(read_recording(shared_recordings / f"{name}.toml")))
+
+        return read_model(folder_made_once(tmp_path_factory, f"reconstructed-{name}", make) / "MODEL")
+
+    return model
+
+
+@pytest.fixture(scope="session")
 def measured_data() -> Path:
     """The folder of other people's measurements beside the checkout; the same."""
     return _shared("realdata", "measurements")
+
+
+@pytest.fixture(scope="session")
+def block_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A block of 30 kPa, 60 x 60 x 30 mm, its base at z = 0, as a MODEL folder with its compliance and the
+    stiffness of its surface; only to be read."""
+    from palpate.mechanics.model.files import read_model, write_model
+    from palpate.render.registry import create
+    from palpate.render.surface.felt_surface import with_own_stiffness
+
+    from .render import shapes
+
+    def make(folder: Path) -> None:
+        path = write_model(folder / "block", shapes.model(shapes.block((0.06, 0.06, 0.03), (4, 4, 2))))
+        with_own_stiffness(create("fem", read_model(path)))
+
+    return folder_made_once(tmp_path_factory, "block", make) / "block"
 
 
 @pytest.fixture

@@ -35,7 +35,7 @@ VALUES = st.recursive(
     max_leaves=6,
 )
 SEEDS = st.integers(0, 1 << 32)
-few = settings(max_examples=60, deadline=None, derandomize=True)
+few = settings(max_examples=30, deadline=None, derandomize=True)
 DESCRIPTION = {
     "recording": {"sample_rate_hz": 1000.0, "force_on": "tool", "boundary_phase": [0.0, 0.1]},
     "tool": {"tip_radius_m": 0.005, "mass_kg": 0.05},

@@ -11,7 +11,7 @@ from benchmarks.felt_surface import forces
 from tests.render.test_true_shape import FILLET, HEIGHT, RADIUS, filleted, meshed
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_places_force_does_not_depend_on_the_mesh():
     turn, around = np.radians([10.0, 45.0, 75.0]), np.radians([15.0, 100.0, 190.0])
     lean = np.column_stack([np.cos(turn), np.sin(turn)])

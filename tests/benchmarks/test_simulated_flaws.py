@@ -10,6 +10,7 @@ from benchmarks.simulated import _verdict, _world
 from palpate.diagnosis.other_simulator.forces import Forces
 
 
+@pytest.mark.release
 def test_two_wrong_parameters_are_both_given():
     flaws = {flaw.name: flaw for flaw in FLAWS}
     planted = [(flaws["stated_modulus"], 1.5), (flaws["stated_tip_radius"], 1.2)]
@@ -22,6 +23,7 @@ def parameters():
     return Parameters(Block(0, LAYOUT))
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("field", "side"), [("modulus_pa", 0), ("modulus_pa", 1), ("radius_m", 1)])
 def test_a_wrong_parameter_changes_the_force_by_the_drawn_multiple(parameters, field, side):
     block = Block(0, LAYOUT)
@@ -31,6 +33,7 @@ def test_a_wrong_parameter_changes_the_force_by_the_drawn_multiple(parameters, f
     assert change == pytest.approx(8 * parameters.visible_n, rel=0.1)
 
 
+@pytest.mark.release
 def test_pairs_of_a_simulators_flaws_are_two_of_its_single_ones(parameters):
     """Else what each changes alone would have to be run for them again."""
     rng = np.random.default_rng(3)
@@ -55,7 +58,7 @@ def test_what_a_simulator_has_of_its_own_is_no_answer_to_what_was_planted():
     assert new_in({"sizes_n": {"time_step": 0.1}, "named": ["time_step"]}) == ["time_step"]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_sensor_that_reads_late_gives_no_simulation_a_wrong_modulus():
     block = Block(0, LAYOUT)
     law = Forces(block.t, block.force(Given(poisson=POISSON)), "law")

@@ -26,6 +26,7 @@ def run(tmp_path, *words):
     return simulators.run(parser.parse_args([*words, "--work", str(tmp_path / "rows")]))
 
 
+@pytest.mark.release
 def test_runs_at_several_times_make_one_table_and_a_page(tmp_path, monkeypatch):
     """Each press is run once; a later run of other simulators shows the earlier ones too."""
     pytest.importorskip("skfem")

@@ -155,7 +155,7 @@ def test_frames_are_rotations_tilted_as_drawn():
         assert np.abs(shift).max() <= 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_nuisances_leave_the_truth_as_it_is(tmp_path):
     """The same exploration by another instrument: only the weight is added to the force of the contact."""
     full = thing(0)

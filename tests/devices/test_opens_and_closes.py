@@ -18,7 +18,7 @@ from palpate.devices.base import ForceSink
 
 from .benches import MAKERS, eventually
 
-CYCLES = 1000
+CYCLES = 300
 WARM_UP = 50
 MOST_BYTES = 16384
 """Of memory a cycle, the emulator's own in the same process too: no thread's stack, no buffer of messages."""

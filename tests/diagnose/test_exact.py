@@ -79,6 +79,7 @@ def test_what_the_law_may_be_off_by_is_what_the_solver_is(forwards):
     np.testing.assert_allclose(shares[1], Stiffness.solved.value / options.law * shares[0])
 
 
+@pytest.mark.slow
 def test_a_diagnosis_says_what_was_solved(bench, monkeypatch):
     monkeypatch.setattr(solved_places, "_solved", _deep_places_are_stiffer(solved_places._solved))
     recording, model = bench.record()

@@ -39,6 +39,7 @@ def test_a_weight_that_turns_is_told_from_a_bias(heavy):
     np.testing.assert_allclose(free.turning.first @ free.turning.tool_n, [0, 0, 0.588], atol=0.03)
 
 
+@pytest.mark.slow
 def test_it_is_named_and_taken_off(heavy):
     recording, model = heavy
     result = diagnose(recording, model, DiagnoseOptions(fast=True, bootstrap=100))

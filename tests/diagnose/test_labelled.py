@@ -18,11 +18,18 @@ EXPECTED = {
     "example-time-delay": "time_delay",
     "example-viscoelasticity": "viscoelasticity",
 }
+ALIKE = ("silicone-2-block", "silicone-3-halfsphere")
+"""Other shapes of what the cylinder shows."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", EXPECTED)
-def test_labelled(shared_recordings, name):
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.release if name in ALIKE else pytest.mark.slow)
+        for name in EXPECTED
+    ],
+)
+def test_labelled(shared_recordings, reconstructed, name):
     """With the tracing to be found; where it is stated, the object is the same."""
     from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct
 
@@ -35,7 +42,7 @@ def test_labelled(shared_recordings, name):
     if EXPECTED[name] == "inclusion":
         # a place above the ball that is left out is not told by the others: what they all say stands beside
         assert any(reason.startswith("fitted to all places it is") for reason in result.reasons)
-    other = reconstruct(stated, ReconstructOptions())
+    other = reconstructed(name)
     np.testing.assert_allclose(other.presses.onset_s, model.presses.onset_s, atol=0.005)
     np.testing.assert_allclose(other.presses.point, model.presses.point, atol=1e-4)
     low, high = model.material.young_modulus_ci95_pa

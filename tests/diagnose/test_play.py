@@ -61,6 +61,7 @@ def test_a_play_beside_tremor_is_one_name(bench):
     assert found.final.found.of("backlash")[0] == pytest.approx(-WIDTH, rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_memory_beside_a_play_that_the_support_showed_is_one_name_more(bench):
     rigid = Rigid(0.0, 1e-6, 1e-6, 10.0, play=-WIDTH, play_error=1e-6)
     known = seen_play(rigid, set())
@@ -80,11 +81,13 @@ def put_back(bench, alter, *chosen: str) -> list[str]:
     return fewer(search, chosen, whole, alone, frozenset())[1]
 
 
+@pytest.mark.slow
 def test_two_names_are_put_back_to_the_play_that_does_as_well(bench):
     found = put_back(bench, lambda t, x, f: (followed(x), f), "viscoelasticity", "time_delay")
     assert found == ["backlash"]
 
 
+@pytest.mark.slow
 def test_two_names_that_are_both_there_stay(bench):
     found = put_back(bench, lambda t, x, f: (followed(x), relaxed(t, f)), "backlash", "viscoelasticity")
     assert found == ["backlash", "viscoelasticity"]

@@ -41,7 +41,7 @@ def test_elastomers_in_tension_stay_predicted(measured_data):
     assert np.median([r["error"] for r in found]) < 0.015 < np.median([r["floor"] for r in found])
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_silicones_in_compression_stay_within_3_percent(measured_data):
     found = rows(measured_data, "silicones", every=3)
     assert len(found) == 7

@@ -143,7 +143,7 @@ def test_what_does_the_same_is_there():
     assert all((REPOSITORY / path).exists() for path in ELSEWHERE.values())
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("page", [p for p in GUIDE if name_of(p) in RUN], ids=name_of)
 def test_the_commands_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -115,7 +115,7 @@ MARKED = [
 ]
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("code", MARKED)
 def test_marked_blocks_run(code, tmp_path):
     script = tmp_path / "script.py"

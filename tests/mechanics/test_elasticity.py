@@ -167,9 +167,8 @@ def test_quadratic_elements_do_not_lock(box):
 
 
 @pytest.mark.skipif(not available(), reason="the mixed element's system needs an indefinite factorisation")
-@pytest.mark.parametrize("poisson_ratio", [0.3, 0.45, 0.49, 0.499])
-def test_a_bonded_block_does_not_lock(box, poisson_ratio):
+def test_a_bonded_block_does_not_lock(box):
     """A thin block's compliance on 12 mm elements against a mixed element, which cannot lock, on 8 mm."""
-    found, _ = compliance(box((8, 8, 3), (0.1, 0.1, 0.03)).quadratic(), poisson_ratio)
-    reference = mixed_compliance(box((12, 12, 4), (0.1, 0.1, 0.03)).quadratic(), poisson_ratio)
+    found, _ = compliance(box((8, 8, 3), (0.1, 0.1, 0.03)).quadratic(), 0.499)
+    reference = mixed_compliance(box((12, 12, 4), (0.1, 0.1, 0.03)).quadratic(), 0.499)
     assert found == pytest.approx(reference, rel=0.01)

@@ -56,6 +56,7 @@ def punch_force(rings: int) -> float:
     return -(matrix @ u).reshape(-1, 3)[under, 2].sum() / known
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not available(), reason="large systems, slow without MKL")
 def test_flat_punch_converges_to_the_half_space():
     """The force is too great in proportion to the elements at the rim, and right for ones of no size."""

@@ -44,6 +44,7 @@ def those_with(texts: dict[str, str], pattern: str) -> dict[str, ast.Module]:
     return {module: ast.parse(text) for module, text in texts.items() if re.search(pattern, text)}
 
 
+@pytest.mark.slow
 def test_python_calls_nothing_that_is_compiled_for_kernels_alone(texts):
     alone = {
         (module, node.name)

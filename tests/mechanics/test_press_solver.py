@@ -196,7 +196,7 @@ def test_a_tip_that_slides_drags_by_coulombs_law():
     assert -pressed.force[-1, 0] / pressed.force[-1, 2] == pytest.approx(0.3, abs=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_slippery_tip_goes_deep_with_less_force_than_one_that_sticks():
     depths = np.array([2e-3, 4e-3, 6e-3])
     forces = [

@@ -72,6 +72,7 @@ def test_sites_leave_the_callers_arrays_writable(box):
         touch_sites(mesh, points, normals * 0, 0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not available(), reason="large systems, slow without MKL")
 def test_what_a_stiff_layer_adds_does_not_hang_on_the_patch_that_the_shape_is_felt_under(box):
     """The renderer's tables and a site agree, and both give the layer what a load as narrow as elements bear

@@ -58,7 +58,9 @@ def factorised(monkeypatch) -> list[int]:
     return count
 
 
-@pytest.mark.parametrize("cells", [6, 12])  # of 10 mm, which touches halve, and of 5 mm, which they do not
+@pytest.mark.parametrize(
+    "cells", [6, pytest.param(12, marks=pytest.mark.slow)]
+)  # of 10 mm, which touches halve, and of 5 mm, which they do not
 def test_a_solved_field_is_that_of_touch_sites(cells):
     places = _places(cells)
     log = _field(places, 0.3, 0)
@@ -71,6 +73,7 @@ def test_a_solved_field_is_that_of_touch_sites(cells):
     np.testing.assert_allclose(half[0], half_space_compliance(UP, NU, width))
 
 
+@pytest.mark.slow
 def test_the_bounds_hold_the_compliance_of_another_field():
     places = _places(12)
     log = _field(places, 0.3, 0)
@@ -87,6 +90,7 @@ def test_the_bounds_hold_the_compliance_of_another_field():
     assert missed.max() < 0.35 * apart.max()
 
 
+@pytest.mark.slow
 def test_fields_that_differ_little_share_a_factorisation(factorised):
     places = _places(12)
     log = _field(places, 0.3, 0)
@@ -104,6 +108,7 @@ def test_fields_that_differ_little_share_a_factorisation(factorised):
         assert np.abs(error).max() < 2e-3
 
 
+@pytest.mark.slow
 def test_a_field_far_from_all_is_solved_anew(factorised):
     places = _places(12)
     far_in_field(places, _field(places, 0.3, 0))

@@ -119,8 +119,9 @@ def test_what_is_felt_of_a_mesh_alone_is_its_boundary():
 
 
 def test_time_is_said_by_places_and_laws():
-    assert said_beforehand(1) == "1 place to solve, about 10 s of processor time"
-    assert said_beforehand(12, 2) == "12 places to solve under 2 laws, about 4 min of processor time"
+    assert "1 place " in said_beforehand(1) and "10 s" in said_beforehand(1)
+    twelve = said_beforehand(12, 2)
+    assert "12 places" in twelve and "2 laws" in twelve and "4 min" in twelve
 
 
 @pytest.mark.slow

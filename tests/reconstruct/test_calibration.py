@@ -10,7 +10,7 @@ import pytest
 
 import palpate as pp
 from palpate import cli
-from palpate.diagnosis.calibrate.on_object import STIFFEST, instrument_of
+from palpate.diagnosis.calibrate.on_object import instrument_of
 from palpate.diagnosis.calibrate.on_plate import calibrate_on_plate
 from palpate.mechanics.errors import ContactError, OptionError, RecordingError
 from palpate.mechanics.recording.calibration import Calibration, read_calibration
@@ -127,9 +127,9 @@ def test_a_tools_give_is_of_the_true_force(trust, gain, radius):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("gain", "stiffness"), [(1.25, np.inf), (1.12, 900.0)])
-def test_ground_of_known_modulus_tells_gain_and_bending_together(gain, stiffness):
+def test_ground_of_known_modulus_tells_gain_and_bending_together():
     """Nine straight presses cannot part them: what is said of one must leave room for the other."""
+    gain, stiffness = 1.12, 900.0
     clean = raster((3, 3), 0.012, depth_m=0.0025, press_s=0.8)
     spoilt = dataclasses.replace(
         clean,
@@ -140,8 +140,8 @@ def test_ground_of_known_modulus_tells_gain_and_bending_together(gain, stiffness
     low, high = found.interval["common_gain"]
     assert low < gain < high and high - low < 0.6
     soft, stiff = found.interval["stiffness_n_per_m"]
-    assert soft < min(stiffness, STIFFEST) <= stiff
-    assert ("tool's bending" in found.about["not_told"]) == (stiffness > STIFFEST)
+    assert soft < stiffness <= stiff
+    assert "tool's bending" not in found.about["not_told"]
 
 
 def test_the_command_says_how_recordings_are_read_by_it(tmp_path, capsys):

@@ -17,6 +17,11 @@ from ..support.faults import FAULTS
 from .exploration_of_cylinder import explore_cylinder
 
 NEED_PRESSES = ("base half the size", "base double the size", "support 2 cm too high")
+ALIKE = (
+    "force in grams", "position x 10", "position / 1000", "encoder stuck 5 s", "saturated at half",
+    "gap of a year", "rate said 10 times", "50 Hz", "force 120 ms late",
+)  # fmt: skip
+"""Other sizes of faults that are tried everyday."""
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -30,7 +35,10 @@ def test_a_heavy_tool_and_a_bias_are_no_faults():
     assert checked_samples(recording).found == ()
 
 
-@pytest.mark.parametrize("fault", [f for f in FAULTS if f not in NEED_PRESSES])
+@pytest.mark.parametrize(
+    "fault",
+    [pytest.param(f, marks=[pytest.mark.release] * (f in ALIKE)) for f in FAULTS if f not in NEED_PRESSES],
+)
 def test_a_fault_is_found_under_its_name(cylinder, fault):
     it = FAULTS[fault]
     try:
@@ -40,7 +48,9 @@ def test_a_fault_is_found_under_its_name(cylinder, fault):
     assert found and found[0].name in it.names, [f.line() for f in found]
 
 
-@pytest.mark.parametrize("fault", NEED_PRESSES)
+@pytest.mark.parametrize(
+    "fault", [pytest.param(NEED_PRESSES[0], marks=pytest.mark.release), *NEED_PRESSES[1:]]
+)
 def test_a_base_that_does_not_fit_the_presses_is_found(cylinder, fault):
     it = FAULTS[fault]
     found = check(it.change(cylinder[0], np.random.default_rng(0)))

@@ -121,6 +121,7 @@ def test_a_folder_that_is_no_model_is_not_overwritten(files, tmp_path, capsys):
     assert "no MODEL folder" in refused(files[0], tmp_path, capsys)
 
 
+@pytest.mark.slow
 def test_a_recording_becomes_a_model_with_a_report(files, tmp_path, capsys, nothing_to_press):
     output, figures = tmp_path / "MODEL", tmp_path / "out.json"
     words = ["--surface", "hull", "--mesh-size", "0.019", "--json", str(figures)]

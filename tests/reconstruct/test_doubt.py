@@ -43,7 +43,7 @@ def touches():
     return recording, explore(recording, boundary=nowhere(recording))
 
 
-@pytest.mark.parametrize("name", SOLIDS)
+@pytest.mark.parametrize("name", [name for name in SOLIDS if name != "right"])
 def test_first_touches_tell_another_objects_shape(touches, tmp_path, name):
     recording, found = touches
     options = GeometryOptions(shape=stl(tmp_path, name), unit="m")

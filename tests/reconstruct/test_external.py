@@ -132,15 +132,6 @@ def test_a_hold_is_told_by_its_own_ramp_whatever_the_depth_law(form):
     assert np.sqrt(np.mean(left**2)) < 0.03 * np.sqrt(np.mean(none**2))
 
 
-@pytest.mark.slow
-def test_unseen_holds_of_beef_are_told_by_two_numbers(measured):
-    from benchmarks.tissue_laws import unseen_holds
-
-    folder = measured / "meat_indentation_relaxation" / "csv"
-    told = unseen_holds(sorted(folder.glob("230331_[RF]*.csv"))[:16])
-    assert told["prony"]["closed"] > 0.9 and told["power law"]["closed"] > 0.9
-
-
 def test_a_relaxation_is_recovered_and_flagged():
     t = np.linspace(0, 10, 300)
     fit = fit_relaxation(t, 2.0 * (0.5 + 0.3 * np.exp(-t / 0.3) + 0.2 * np.exp(-t / 4)))

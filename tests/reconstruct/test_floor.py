@@ -40,12 +40,14 @@ def of_one_modulus(made) -> HeldOutErrors:
     return told
 
 
+@pytest.mark.slow
 def test_one_modulus_loses_where_it_differs_from_place_to_place(varied):
     told = of_one_modulus(varied)
     assert told.beaten_by in RIVALS and told.floor_n < 0.5 * told.model_n
     assert told.doubt == ""
 
 
+@pytest.mark.slow
 def test_the_first_line_says_who_predicts_better(varied):
     lost = dataclasses.replace(varied, held_out=of_one_modulus(varied))
     first, held = lost.lines()[0], lost.as_json()
@@ -54,12 +56,14 @@ def test_the_first_line_says_who_predicts_better(varied):
     assert "--field auto" not in first, "it was asked for here"
 
 
+@pytest.mark.slow
 def test_a_field_is_fitted_where_one_modulus_is_beaten(varied):
     assert varied.model.material.field is not None
     assert varied.held_out.beaten_by == "" and varied.held_out.model_n < 0.5 * of_one_modulus(varied).model_n
     assert "1D" not in varied.lines()[0] and varied.as_json()["beaten_by"] is None
 
 
+@pytest.mark.slow
 def test_an_even_ground_stays_of_one_modulus(factorised_once):
     made = reconstruct_fully(points((6, 5), rows=8), WHERE_BEATEN)
     assert made.held_out.beaten_by == "" and made.held_out.floor in RIVALS

@@ -125,6 +125,7 @@ def test_a_mesh_size_of_nothing_is_refused(surface):
         mesh_surface(surface, MeshingOptions(mesh_size_m=0.0))
 
 
+@pytest.mark.slow
 def test_a_mesh_beyond_its_bound_is_made_anew_and_the_best_is_kept(surface, monkeypatch):
     made, standing = [], meshing_module._standing
     monkeypatch.setattr(meshing_module, "_standing", lambda *given: made.append(standing(*given)) or made[-1])
@@ -163,6 +164,7 @@ def paper_meshing():
     return mesh_surface(surface, MeshingOptions(mesh_source="voxels"))
 
 
+@pytest.mark.slow
 def test_the_papers_mesh_keeps_both_of_its_bounds(paper_meshing):
     report = paper_meshing.report
     assert report.radius_edge_ratio.max() <= 2.0
@@ -227,6 +229,7 @@ def test_a_mesher_that_hangs_is_tried_again_with_one_thread_on_a_simplified_draw
     assert volume == pytest.approx(0.06 * 0.06 * 0.03, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_mesh_that_the_support_flattens_is_made_again(surface, monkeypatch):
     relax, made = meshing_module.relaxed, []
 

@@ -9,7 +9,7 @@ import pytest
 from ..support import modulus_mesh
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_modulus_is_that_of_a_finer_mesh():
     parser = argparse.ArgumentParser()
     modulus_mesh.add_arguments(parser)

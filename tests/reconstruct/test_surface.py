@@ -33,7 +33,12 @@ def known(name, surface="auto"):
 
 
 @pytest.mark.parametrize(
-    ("name", "method"), [("cylinder", "cylinder"), ("block", "block"), ("half-sphere", "sphere")]
+    ("name", "method"),
+    [
+        ("cylinder", "cylinder"),
+        ("block", "block"),
+        pytest.param("half-sphere", "sphere", marks=pytest.mark.release),
+    ],
 )
 def test_the_papers_shapes_are_recognised(name, method):
     found, error = known(name)
@@ -50,6 +55,7 @@ def test_a_sharp_shape_beats_the_hull_at_its_rims():
     assert hull["volume_error"] < -0.05
 
 
+@pytest.mark.slow
 def test_a_bean_keeps_its_dent():
     truth = phantom_truth("bean")
     found, error = reconstructed(truth)
@@ -68,7 +74,7 @@ def deviation_of_hull(truth):
 
 @pytest.mark.parametrize(
     "name",
-    ["frustum", "blob", *(pytest.param(name, marks=pytest.mark.slow) for name in ("ellipsoid", "gable"))],
+    ["blob", *(pytest.param(name, marks=pytest.mark.release) for name in ("frustum", "ellipsoid", "gable"))],
 )
 def test_shapes_nobody_told_it_of(name):
     _, error = reconstructed(OWN[name]())
@@ -84,7 +90,7 @@ def test_an_outline_that_no_point_sees_whole():
     assert abs(error["volume_error"]) < 1.5 * VOLUME
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_every_known_shape_within_the_targets():
     from benchmarks.surface import truths
 
@@ -134,7 +140,7 @@ def test_the_frame_of_the_device_does_not_matter():
 
 
 def test_the_base_lies_on_the_support():
-    found, _ = known("dome")
+    found, _ = known("cylinder")
     height = (found.vertices - found.support_point) @ found.support_normal
     assert height.min() == pytest.approx(0, abs=1e-9)
     assert (np.abs(height) < 1e-9).sum() > 50
@@ -155,6 +161,7 @@ def test_uncertainty_is_small_at_touches_and_large_at_rims():
     assert sd_m > 0.001 and abs(height - 0.08) < 0.003 and abs(across - 0.04) < 0.003
 
 
+@pytest.mark.slow
 def test_uncertainty_covers_the_error_of_a_free_form():
     truth = OWN["blob"]()
     evidence, back = touch(truth, 2)
@@ -192,10 +199,10 @@ def test_touches_on_the_support_alone_are_refused():
 @pytest.mark.parametrize(
     ("stem", "name"),
     [
-        ("silicone-2-block", "block"),
-        pytest.param("silicone-1-cylinder", "cylinder", marks=pytest.mark.slow),
-        pytest.param("silicone-3-halfsphere", "half-sphere", marks=pytest.mark.slow),
-        pytest.param("example-time-delay", "cylinder", marks=pytest.mark.slow),
+        pytest.param("silicone-2-block", "block", marks=pytest.mark.slow),
+        pytest.param("silicone-1-cylinder", "cylinder", marks=pytest.mark.release),
+        pytest.param("silicone-3-halfsphere", "half-sphere", marks=pytest.mark.release),
+        pytest.param("example-time-delay", "cylinder", marks=pytest.mark.release),
     ],
 )
 def test_the_labelled_recordings_meet_the_targets(shared_recordings, stem, name):
@@ -239,6 +246,7 @@ def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
     assert np.hypot(*slopes) < 0.25
 
 
+@pytest.mark.release
 def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_walls():
     from palpate.reconstruction.shapes.choice import direction_score, try_shapes
     from palpate.reconstruction.shapes.prism import Prism

@@ -4,6 +4,8 @@ import json
 import subprocess
 import sys
 
+import pytest
+
 COMPILING = """
 import gc
 import json
@@ -56,6 +58,7 @@ def compiled() -> tuple[list[str], list[list[str]]]:
     return found, kinds
 
 
+@pytest.mark.slow
 def test_a_kernel_is_compiled_once_and_found_by_the_next_process():
     compiled()
     found, kinds = compiled()

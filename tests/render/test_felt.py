@@ -130,6 +130,7 @@ def test_before_that_the_touch_sites_tell_it(folder):
     assert felt_surface(folder, sites).stiffness_from == PRESSES  # the better stays
 
 
+@pytest.mark.slow
 def test_a_press_by_the_command_leaves_the_stiffness_in_the_folder(tmp_path):
     plain = shapes.model(shapes.block((0.05, 0.05, 0.025), (3, 3, 2)), presses=no_presses(0.005))
     path = write_model(tmp_path / "plain", plain)

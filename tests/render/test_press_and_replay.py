@@ -99,15 +99,19 @@ def test_replay_error_counts_contact_samples_of_phase_two_only(cylinder_renderer
         replay(cylinder_renderer, t, position[:-1])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "limit_n"),
-    [("silicone-1-cylinder", 0.045), ("silicone-2-block", 0.045), ("silicone-3-halfsphere", 0.05)],
+    [
+        pytest.param("silicone-1-cylinder", 0.045, marks=pytest.mark.slow),
+        pytest.param("silicone-2-block", 0.045, marks=pytest.mark.release),
+        pytest.param("silicone-3-halfsphere", 0.05, marks=pytest.mark.release),
+    ],
 )
-def test_a_reconstructed_model_replays_its_recording(shared_recordings, tmp_path, name, limit_n):
+def test_a_reconstructed_model_replays_its_recording(
+    shared_recordings, reconstructed, tmp_path, name, limit_n
+):
     recording = str(shared_recordings / f"{name}.toml")
-    model = str(tmp_path / "model")
-    assert main(["reconstruct", recording, "-o", model]) == 0
+    model = str(reconstructed(name).path)
     for run in ("a", "b"):
         arguments = [
             "replay",

@@ -8,20 +8,15 @@ import pytest
 
 from palpate.cli import main
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.model.files import write_model
 from palpate.render.press import read_curve
 from palpate.testing import press_model  # noqa: F401  (pytest finds the fixture by its name)
-
-from . import shapes
 
 DOWN = ["--at", "0,0,0.03", "--direction", "0,0,-1", "--depth", "0.003", "--speed", "0.02"]
 
 
-@pytest.fixture(scope="module")
-def model_folder(tmp_path_factory):
-    """A block of 30 kPa, 60 x 60 x 30 mm, as a MODEL folder."""
-    made = shapes.model(shapes.block((0.06, 0.06, 0.03), (4, 4, 2)))
-    return str(write_model(tmp_path_factory.mktemp("models") / "block", made))
+@pytest.fixture
+def model_folder(block_folder):
+    return str(block_folder)
 
 
 def test_a_curve_that_was_stored_is_met_again_and_another_law_is_told(model_folder, tmp_path, capsys):

@@ -10,13 +10,10 @@ import pytest
 
 from palpate.cli import main
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.model.files import write_model
 from palpate.render.press import Stroke, press, read_curve
 from palpate.render.replay import replay
 from palpate.render.scene import TouchScene, in_the_air, scene_of
 from palpate.render.support import SupportOptions, support_plane
-
-from . import shapes
 
 TIP = 0.005
 BESIDE = [0.09, 0.0, 0.0]  # the block ends at 0.06
@@ -98,9 +95,8 @@ def test_a_device_makes_the_plane_softer(block_renderer):
         SupportOptions(support_friction=-1.0)
 
 
-def test_press_and_replay_have_the_support_on_the_command_line(tmp_path, capsys):
-    made = shapes.model(shapes.block((0.06, 0.06, 0.03), (4, 4, 2)))
-    folder = str(write_model(tmp_path / "block", made))
+def test_press_and_replay_have_the_support_on_the_command_line(block_folder, tmp_path, capsys):
+    folder = str(block_folder)
     curve, result = str(tmp_path / "curve.csv"), tmp_path / "result.json"
     there = ["press", folder, "--at", "0.05,0,0", "--direction", "0,0,-1", "--depth", "0.001"]
     assert main([*there, "--hold", "0.1", "-o", curve, "--json", str(result)]) == 0

@@ -57,7 +57,7 @@ def meshed(shape: TrueShape, cells: tuple[int, int]) -> TetMesh:
     return TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable, shape)
 
 
-@pytest.mark.parametrize("cells", [(6, 5), (9, 7)])
+@pytest.mark.parametrize("cells", [(6, 5), pytest.param((9, 7), marks=pytest.mark.release)])
 def test_the_felt_surface_is_the_shape_on_its_fillets(cells):
     mesh = meshed(filleted(), cells)
     arrays = contact_surface(mesh).arrays
@@ -115,7 +115,13 @@ def rounded_and_sharp():
     return [(bend, model, shapes.quick_compliance(model)) for bend, model in made]
 
 
-@pytest.mark.parametrize("mu", [0.3, *(pytest.param(mu, marks=pytest.mark.slow) for mu in (0.0, np.inf))])
+@pytest.mark.parametrize(
+    "mu",
+    [
+        pytest.param(0.3, marks=pytest.mark.slow),
+        *(pytest.param(mu, marks=pytest.mark.release) for mu in (0.0, np.inf)),
+    ],
+)
 def test_sliding_over_a_fillet_and_a_sharp_rim_never_steps(rounded_and_sharp, mu):
     step = 2e-6
     for fillet, made, compliance in rounded_and_sharp:

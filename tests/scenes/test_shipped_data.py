@@ -29,7 +29,10 @@ MAKE = (
 MOST_BYTES = 10_000_000
 
 
-@pytest.fixture(scope="module", params=SHIPPED)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[pytest.mark.slow] * (name != "demo")) for name in SHIPPED],
+)
 def model(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Model:
     """A shipped model as a first touch opens it, its scene's content unchanged."""
     scene = load_scene(request.param)
@@ -55,11 +58,7 @@ def test_nothing_is_computed_for_a_first_touch(model: Model, monkeypatch: pytest
     with_own_stiffness(FemRenderer(model))
 
 
-@pytest.mark.parametrize(
-    "model",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name != "demo")) for name in SHIPPED],
-    indirect=True,
-)
+@pytest.mark.slow
 def test_places_give_as_they_would_if_they_were_solved_today(model: Model) -> None:
     compliance = load_or_condense(model)
     points, normals = compliance.own_points, compliance.own_normals

@@ -65,14 +65,14 @@ def test_help_all_ends_well(capsys):
 @pytest.mark.parametrize(
     ("words", "meant"),
     [
-        (["tuch"], "'tuch' is no command; did you mean touch?"),
-        (["press", "demo", "--att", "0,0,0"], "'--att' is no option; did you mean --at?"),
-        (["press", "demo", "--spede=1"], "'--spede' is no option; did you mean --speed?"),
-        (["press", "demo", "--at", "0,0,0", "--renderer", "fme"], "did you mean fem?"),
-        (["press", "noduel", "--at", "0,0,0"], "'noduel' is no scene; did you mean nodule?"),
-        (["simulate", "block", "-o", "x.csv", "--effect", "friction-slipp=1"], "did you mean friction_slip?"),
-        (["diagnose", "silicone-1-cylinder", "--without", "frction"], "did you mean friction_slip?"),
-        (["touch", "--headless", "--device", "simulted"], "did you mean simulated?"),
+        (["tuch"], "touch"),
+        (["press", "demo", "--att", "0,0,0"], "--at"),
+        (["press", "demo", "--spede=1"], "--speed"),
+        (["press", "demo", "--at", "0,0,0", "--renderer", "fme"], "fem"),
+        (["press", "noduel", "--at", "0,0,0"], "nodule"),
+        (["simulate", "block", "-o", "x.csv", "--effect", "friction-slipp=1"], "friction_slip"),
+        (["diagnose", "silicone-1-cylinder", "--without", "frction"], "friction_slip"),
+        (["touch", "--headless", "--device", "simulted"], "simulated"),
     ],
 )
 def test_what_was_meant_is_told_in_one_line(words, meant, capsys, tmp_path, monkeypatch):
@@ -82,7 +82,7 @@ def test_what_was_meant_is_told_in_one_line(words, meant, capsys, tmp_path, monk
     except SystemExit as stop:
         code = stop.code
     said = capsys.readouterr().err.strip().splitlines()
-    assert code == 2 and meant in said[-1] and len(said) == 1
+    assert code == 2 and re.search(rf"(?<![\w-]){meant}\?", said[-1]) and len(said) == 1
 
 
 def test_what_is_like_nothing_is_answered_with_what_is_allowed():
@@ -151,8 +151,6 @@ def test_a_shell_is_told_to_ask_the_program(shell):
     [
         ("palpate reco", {"reconstruct"}),
         ("palpate reconstruct --mesh-si", {"--mesh-size"}),
-        ("palpate reconstruct --dent-law neo", {"neo-hookean"}),
-        ("palpate export --to s", {"sofa", "stl"}),
         ("palpate press --renderer kel", {"kelvin-voigt"}),
     ],
 )

@@ -1,9 +1,9 @@
 """`python -m tests.support NAME [options]`, from the clone: run what checks at length, and print what it saw.
 
-NAME: fuzz (hostile files, options and bytes; interrupts), check_up (faults found in recordings), soak (a long
-session of the servo), effects_in_servo (each effect is felt), elements (locking), mesh_independence (of a
-press), modulus_mesh (of the modulus), touch_model and large_presses (predicted forces where the truth is
-known), drag (what a dragged press feels).
+NAME: fuzz (hostile files, options and bytes; interrupts), soak (a long session of the servo),
+effects_in_servo (each effect is felt), elements (locking), mesh_independence (of a press), modulus_mesh (of
+the modulus), touch_model and large_presses (predicted forces where the truth is known), drag (what a dragged
+press feels).
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import sys
 from tools.script import script
 
 NAMES = (
-    "check_up",
     "drag",
     "effects_in_servo",
     "elements",

@@ -18,7 +18,6 @@ from benchmarks.timing import table
 
 TOLD_APART = 0.07
 SPEED_M_PER_S, SMOOTH_M, END_M = 0.02, 0.004, 0.006
-COLOURS = ("#c1121f", "#d98c00", "#1d3557")
 _TICK_S, _APPROACH, _POINTS = 1e-3, 500, 600
 
 
@@ -27,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scene", default="nodule", help="scene, MODEL or phantom (default: nodule)")
     parser.add_argument("--depth", type=float, default=0.003, metavar="M", help="of the press [m]")
     parser.add_argument("--height", type=float, default=0.006, metavar="M", help="of the foot's line [m]")
-    parser.add_argument("--figure", metavar="PNG", help="draw map, lines and forces")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -41,18 +39,14 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     scene = load_scene(arguments.scene)
     renderer = create("fem", model_of(scene), with_friction(RenderOptions(), scene))
     found: dict[str, Any] = {}
-    drawn = {}
     for name, line in _lines(renderer, arguments.height).items():
         way, force = dragged(renderer, line, arguments.depth)
-        drawn[name] = line, way, force
         found[name] = ripple(way, force)
     rows = [[name, 1e3 * f["least_n"], 1e3 * f["most_n"], 100 * f["ripple_rms"], 100 * f["ripple_most"],
              f["ripple_most"] / TOLD_APART] for name, f in found.items()]  # fmt: skip
     print(f"{scene.name}, {1e3 * arguments.depth:g} mm deep, dragged at {1e3 * SPEED_M_PER_S:g} mm/s")
     header = ["line", "least [mN]", "most [mN]", "ripple, rms [%]", "most [%]", "over what is told apart"]
     print(table(header, rows))
-    if arguments.figure:
-        _figure(arguments.figure, renderer, drawn, arguments.depth)
     return found
 
 
@@ -142,37 +136,3 @@ def ripple(way: np.ndarray, force: np.ndarray) -> dict[str, float]:
         "ripple_rms": float(np.sqrt((off**2).mean())),
         "ripple_most": float(np.abs(off).max()),
     }
-
-
-def _figure(path: str, renderer: Any, drawn: dict[str, Any], depth_m: float) -> None:
-    from matplotlib import pyplot as plt
-
-    from palpate.mechanics.frames import tangents
-    from palpate.render.surface.felt_surface import local_stiffness
-
-    arrays, up = renderer.contact.arrays, renderer.model.support.normal
-    stiffness = local_stiffness(renderer, renderer.model.tool.tip_radius_m, depth_m)
-    known = np.isfinite(stiffness)
-    seen = (arrays.free > 0) & known[arrays.triangles].all(axis=1)
-    seen &= (arrays.normals[arrays.triangles] @ up).mean(axis=1) > -0.05
-    axes_of = np.column_stack(tangents(up))
-    figure, (left, right) = plt.subplots(
-        1, 2, figsize=(10, 3.9), layout="constrained", width_ratios=[1, 1.25]
-    )
-    colours = left.tripcolor(
-        *(1e3 * arrays.vertices @ axes_of).T, arrays.triangles[seen], np.where(known, stiffness, 0.0),
-        shading="gouraud", cmap="viridis", clim=np.percentile(stiffness[known], [2, 98]), rasterized=True,
-    )  # fmt: skip
-    figure.colorbar(colours, ax=left, label=f"secant stiffness at {1e3 * depth_m:g} mm [N/m]")
-    for colour, (name, (line, way, force)) in zip(
-        ("#c1121f", "#d98c00", "#1d3557"), drawn.items(), strict=True
-    ):
-        left.plot(*(1e3 * line @ axes_of).T, color=colour, lw=1.2)
-        inner = (way > END_M) & (way < way[-1] - END_M)
-        label = f"{name} ({1e3 * way[-1]:.0f} mm)"
-        right.plot(100 * way[inner] / way[-1], 1e3 * force[inner], color=colour, lw=1.3, label=label)
-    left.set(xlabel="across [mm]", ylabel="along [mm]", aspect="equal")
-    right.set(xlabel="along the drag [%]", ylabel="force into the surface [mN]", ylim=(0, None))
-    right.legend(frameon=False, loc="lower center")
-    figure.savefig(path, dpi=100)
-    plt.close(figure)

@@ -1,4 +1,4 @@
-"""What one worker makes and the others share: a folder of a session, and kernels that are being compiled."""
+"""What one worker makes and the others share: a folder, and kernels that are being compiled."""
 
 from __future__ import annotations
 
@@ -13,10 +13,18 @@ from .waiting import eventually
 
 
 def folder_made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
-    """The folder that `make(folder)` fills: in the first worker that asks, the others wait for it."""
-    workers = "PYTEST_XDIST_WORKER" in os.environ
+    """The folder that `make(folder)` fills: in the first worker that asks, the others wait for it.
+
+    It lasts as long as the session; below PALPATE_TESTS_MADE, which the stages of `.ci/run` share, as long as
+    that folder does.
+    """
     base = factory.getbasetemp()
-    folder = (base.parent if workers else base) / name
+    if shared := os.environ.get("PALPATE_TESTS_MADE"):
+        base = Path(shared)
+        base.mkdir(parents=True, exist_ok=True)
+    elif "PYTEST_XDIST_WORKER" in os.environ:
+        base = base.parent
+    folder = base / name
     done = folder.with_suffix(".done")
     try:
         folder.mkdir()

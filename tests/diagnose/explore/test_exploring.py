@@ -174,7 +174,7 @@ def test_a_line_is_a_segment():
     assert made is not None and made.kind == "press" and len(made.t) == 400
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_phantom_is_explored_by_the_command_until_its_goals_are_met(tmp_path, capsys):
     from palpate import cli
 
@@ -191,7 +191,7 @@ def test_a_phantom_is_explored_by_the_command_until_its_goals_are_met(tmp_path, 
     assert cli.main(["reconstruct", str(recording), "-o", str(tmp_path / "MODEL")]) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_the_robots_example_runs_against_the_laboratory(tmp_path):
     import importlib.util
     from pathlib import Path

@@ -14,13 +14,11 @@ from palpate.mechanics.recording.recording import read_recording
 
 
 @pytest.mark.slow
-def test_the_final_answer_is_reconstructions_within_their_intervals(shared_recordings):
-    from palpate.reconstruction.pipeline import reconstruct
-
+def test_the_final_answer_is_reconstructions_within_their_intervals(shared_recordings, reconstructed):
     recording = read_recording(shared_recordings / "silicone-1-cylinder.toml")
     explorer = Explorer.going_on(recording, GoalOptions(most=60))
     state = explorer.state
-    model = reconstruct(recording)
+    model = reconstructed("silicone-1-cylinder")
     low, high = state.modulus_ci95_pa
     other = model.material.young_modulus_ci95_pa
     assert low < model.material.young_modulus_pa < high and other[0] < state.modulus_pa < other[1]
@@ -37,7 +35,7 @@ TRUE_PA = {"time-delay": 35e3, "viscoelasticity": 24e3}
 """As the recordings' descriptions state."""
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.parametrize("name", ["time-delay", "viscoelasticity"])
 def test_the_labelled_cause_stands_alone_and_the_modulus_beside_it_is_the_true_one(shared_recordings, name):
     recording = read_recording(shared_recordings / f"example-{name}.toml")
@@ -47,7 +45,7 @@ def test_the_labelled_cause_stands_alone_and_the_modulus_beside_it_is_the_true_o
     assert low < TRUE_PA[name] < high and high < 1.25 * low
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_sound_object_under_a_sensor_with_a_bias_and_a_drift_has_no_cause(shared_recordings):
     recording = read_recording(shared_recordings / "silicone-2-block.toml")
     zero = np.array([0.2, -0.1, 0.3]) + np.outer(recording.t / recording.t[-1], [0.0, 0.1, 0.1])
@@ -68,7 +66,7 @@ def _passed(estimate, press, by_m):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_a_surface_that_passes_one_touch_is_no_cause(shared_recordings):
     recording = read_recording(shared_recordings / "silicone-2-block.toml")
     explorer = Explorer.going_on(recording, GoalOptions(most=60))
@@ -79,7 +77,7 @@ def test_a_surface_that_passes_one_touch_is_no_cause(shared_recordings):
         assert left_out == (by_m > REACH_M)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 @pytest.mark.xfail(
     strict=True,
     reason="with 38 presses our own errors at all places alike are larger than stated",

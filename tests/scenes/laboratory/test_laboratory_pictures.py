@@ -58,6 +58,7 @@ def test_force_in_time_shows_the_change_of_the_force(springs) -> None:
     assert share == pytest.approx(np.full(len(share), 0.1), rel=1e-3)
 
 
+@pytest.mark.release
 def test_command_draws_a_picture(springs, tmp_path: Path) -> None:
     picture = tmp_path / "c.png"
     arguments = ["simulate", "cylinder", "-o", str(tmp_path / "c.csv.gz"), "--protocol", "brief"]
@@ -66,6 +67,7 @@ def test_command_draws_a_picture(springs, tmp_path: Path) -> None:
     assert picture.stat().st_size > 50_000
 
 
+@pytest.mark.slow
 def test_command_writes_a_page_whose_places_lie_on_the_phantom(springs, tmp_path: Path) -> None:
     page = tmp_path / "c.html"
     arguments = ["simulate", "cylinder", "-o", str(tmp_path / "c.csv.gz"), "--protocol", "brief", "--frame"]

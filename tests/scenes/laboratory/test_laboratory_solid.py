@@ -192,7 +192,7 @@ def test_relaxing_solid_follows_the_quasilinear_law_while_the_contact_grows_and_
     assert force[50:].sum() < 0.9 * elastic[50:].sum() and force.min() > -1e-6
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_relaxation_at_finite_strain_is_that_of_the_condensed_object() -> None:
     small = [_held((0.5, 0.3), linear=True)[1], _held((), linear=True)[1]]
     large = [_held((0.5, 0.3), linear=False)[1], _held((), linear=False)[1]]
@@ -244,7 +244,7 @@ def test_small_dent_is_hertz() -> None:
     assert hertz_ratio() == pytest.approx(1.0, abs=0.015)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_deep_dent_is_the_one_of_an_axisymmetric_solution() -> None:
     depths = np.array([2.0, 3.0, 4.0, 6.0])
     known = dent_law("linear").force(1e-3 * depths, 1e6, 0.49, 0.005)
@@ -262,7 +262,7 @@ def test_press_of_twelve_millimetres_into_a_cylinder_finds_equilibrium_whatever_
     assert force == pytest.approx(finer[1::2], rel=0.005)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_force_of_a_linear_press_does_not_hang_on_the_mesh() -> None:
     thing, point, normal = phantom("cylinder"), np.array([40.0, 0.0, 40.0]), np.array([1.0, 0.0, 0.0])
     depths = np.array([0.7, 1.8, 5.0])

@@ -3,6 +3,7 @@ the scheduler restarted; and the same bits from the MODEL on, whoever does the w
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import shutil
@@ -15,12 +16,10 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 from distributed import Client
 
 import palpate as pp
-from benchmarks._apply_replay import part_of
 from palpate.mechanics.recording.files import recording_files
 from palpate.mechanics.recording.recording import read_recording, write_recording
 from palpate.parallel.engines import DaskEngine, LocalEngine
@@ -30,8 +29,6 @@ from palpate.scenes.embedded import embedded_recording
 
 from ...support.waiting import PATIENCE_S, eventually
 from .test_batch_local import alive
-
-pytestmark = pytest.mark.slow
 
 DOZEN_S = 45.7
 """Until here the recording holds its tracing and twelve presses."""
@@ -89,6 +86,7 @@ def cluster(tmp_path, monkeypatch) -> Iterator[Cluster]:
         made.close()
 
 
+@pytest.mark.slow
 def test_a_killed_worker_and_a_restarted_scheduler_lose_nothing_and_double_nothing(tmp_path, cluster):
     """40 chains of two tasks. What was finished before stays as it was; every result is there once."""
     root, log = tmp_path / "out", tmp_path / "done.log"
@@ -148,12 +146,14 @@ class NoEngine:
         raise AssertionError(f"{job} would be done again")
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_told_in_a_line(monkeypatch):
     monkeypatch.setattr("palpate.parallel.engines._CONNECT_S", 1.0)
     with pytest.raises(pp.OptionError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         DaskEngine("tcp://127.0.0.1:9")
 
 
+@pytest.mark.slow
 def test_an_error_and_a_crash_on_a_dask_worker_cost_their_task_alone(tmp_path, cluster):
     tasks = [
         Task("errands:fail", {"words": "no presses"}, tmp_path / "fail"),
@@ -169,6 +169,7 @@ def test_an_error_and_a_crash_on_a_dask_worker_cost_their_task_alone(tmp_path, c
     assert value["process"] not in [worker.pid for worker in cluster.workers]
 
 
+@pytest.mark.slow
 def test_an_interruption_ends_what_the_cluster_does_for_this_run_and_for_no_other(tmp_path, cluster):
     said = [tmp_path / "ours.txt", tmp_path / "theirs.txt"]
     runs = [[Task("errands:linger", {}, path.with_suffix(""), {"path": str(path)})] for path in said]
@@ -200,12 +201,18 @@ def test_an_interruption_ends_what_the_cluster_does_for_this_run_and_for_no_othe
     assert eventually(lambda: not any(map(alive, processes(said[1]))))
 
 
+@pytest.mark.release
 def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_model_on(tmp_path, cluster):
     """Of replay, compare and diagnose; beside a recording that is broken."""
     _, description = recording_files(embedded_recording("silicone-1-cylinder"))
     (tmp_path / "in").mkdir()
     whole = read_recording(description)
-    dozen = part_of(whole, slice(0, int(np.searchsorted(whole.t, DOZEN_S))))
+    rows = whole.t < DOZEN_S
+    turned = None if whole.quaternion is None else whole.quaternion[rows]
+    dozen = dataclasses.replace(
+        whole, t=whole.t[rows], position=whole.position[rows], force_on_tool=whole.force_on_tool[rows],
+        quaternion=turned, sha256="",
+    )  # fmt: skip
     source = write_recording(tmp_path / "in" / "cylinder.csv.gz", dozen)
     (tmp_path / "in" / "broken.csv").write_text("t,x\n0,1\n")
     shutil.copy(description, tmp_path / "in" / "broken.toml")

@@ -427,6 +427,7 @@ def carried(renderer: FemRenderer) -> str:
     return button(renderer.model)
 
 
+@pytest.mark.slow
 def test_a_report_carries_the_page_or_names_the_command(carried, renderer):
     assert "press it</button>" in carried and len(carried) > 100_000
     elsewhere = button(renderer.model.replaced(path=None))

@@ -43,7 +43,8 @@ def test_rows_without_a_number_are_told_of_and_most_of_them_refused(tmp_path, ca
     some = [",".join([*line.split(",")[:2], "nan"]) if k % 10 == 5 else line for k, line in enumerate(lines)]
     (tmp_path / "dent.csv").write_text("\n".join(some) + "\n")
     assert cli.main(["material", str(tmp_path / "dent.csv"), "--fast", *TIP]) == 0
-    assert "40 of 400 rows lack a number and are left out, the first is row 5" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "40 of 400 rows" in said and "row 5" in said
     most = [",".join([*line.split(",")[:2], "nan"]) if k % 10 > 3 else line for k, line in enumerate(lines)]
     (tmp_path / "dent.csv").write_text("\n".join(most) + "\n")
     refused("240 of 400 rows lack a number", "material", str(tmp_path / "dent.csv"), "--fast", *TIP)

@@ -29,16 +29,15 @@ from palpate.mechanics.recording.recording import read_recording
 from .inputs import block, command, contents, full_disk, one_line
 
 
-@pytest.mark.parametrize("step", [7, pytest.param(1, marks=pytest.mark.slow)])
-def test_no_bit_of_a_stored_file_changes_unnoticed(tmp_path, step):
-    """Of the header every seventh bit, so that no byte is left out; at length every bit."""
+def test_no_bit_of_a_stored_file_changes_unnoticed(tmp_path):
+    """Of the header every seventh bit, so that no byte is left out."""
     path = tmp_path / "x.bin"
     arrays = {"far": np.arange(600.0).reshape(-1, 3), "own": np.arange(50, dtype=np.float32)}
     write_arrays(path, "key", arrays)
     whole = path.read_bytes()
     header = len(whole) - sum(a.nbytes for a in arrays.values()) - 64
     rng = np.random.default_rng(1)
-    places = [*range(0, 8 * header, step), *rng.integers(8 * header, 8 * len(whole), 200).tolist()]
+    places = [*range(0, 8 * header, 7), *rng.integers(8 * header, 8 * len(whole), 200).tolist()]
     for place in places:
         data = bytearray(whole)
         data[place // 8] ^= 1 << place % 8

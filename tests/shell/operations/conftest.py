@@ -8,23 +8,15 @@ import pytest
 import palpate as pp
 from palpate.mechanics.recording.recording import Recording
 
-from ...render import shapes
-from ...support.once import folder_made_once
-
 PLACES_M = ((0.0, 0.0), (0.012, 0.0), (0.0, -0.012))
 DEPTH_M = 0.003
 STIFFER = 1.25
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory):
+def folder(block_folder):
     """A block of 30 kPa, 60 x 60 x 30 mm, its base at z = 0, as a MODEL folder with its compliance."""
-
-    def make(into):
-        made = shapes.model(shapes.block((0.06, 0.06, 0.03), (4, 4, 2)))
-        pp.renderer(pp.load(made).save(into / "block").path, friction=np.inf, progress=False)
-
-    return folder_made_once(tmp_path_factory, "api-block", make) / "block"
+    return block_folder
 
 
 @pytest.fixture(scope="session")

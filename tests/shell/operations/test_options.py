@@ -7,6 +7,7 @@ import dataclasses
 import inspect
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from types import SimpleNamespace
 
 import pytest
@@ -67,8 +68,13 @@ def rooms(monkeypatch):
     )
 
 
+@cache
+def small_block():
+    return shapes.model(shapes.block((0.06, 0.06, 0.03), (2, 2, 1)))
+
+
 def call(name, recording, **options):
-    block = shapes.model(shapes.block((0.06, 0.06, 0.03), (2, 2, 1)))
+    block = small_block()
     arguments = {
         "reconstruct": (recording,),
         "renderer": (block,),

@@ -105,7 +105,7 @@ def test_it_prints_a_few_lines_with_units(results, name):
 def test_a_curve_says_its_modulus_and_names_the_file_that_was_written(curves):
     from palpate.show import next_lines
 
-    assert "the object's Young's modulus is 30 kPa" in str(curves[0])
+    assert "30 kPa" in str(curves[0])
     assert "--expect mine.csv" in " ".join(next_lines(curves[0], written="mine.csv"))
     assert "-o CURVE.csv" in " ".join(next_lines(curves[0]))
 

@@ -62,7 +62,7 @@ def test_readme_runs(tmp_path):
     assert (tmp_path / "my-model" / "mesh.vtu").is_file() and (tmp_path / "press.png").stat().st_size > 10_000
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_page_runs(tmp_path):
     said = run("docs/howto/python.md", tmp_path)
     assert "did you mean mesh_size_m" in said and "{'tool_compliance': 1.0}" in said

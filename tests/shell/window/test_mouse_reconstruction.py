@@ -30,7 +30,7 @@ def press(driven: Driven, place: np.ndarray) -> None:
     driven.rests(0.3)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_what_a_mouse_touched_is_reconstructed(block: Model, tmp_path: Path) -> None:
     path = tmp_path / "mouse.csv.gz"
     channel = PoseChannel.create()
