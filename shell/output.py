@@ -44,11 +44,15 @@ def emit_json(value: Any, destination: str | None) -> None:
 
 
 def plain(value: Any) -> Any:
-    """A value that JSON can hold: arrays as lists, numbers that are not finite as null."""
+    """A value that JSON can hold: arrays as lists, numbers that are not finite as null; of a dataclass what
+    its `as_json` gives, else its fields, each by the name in its metadata ("json") or its own."""
     import numpy as np
 
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return plain(dataclasses.asdict(value))
+        if hasattr(value, "as_json"):
+            return plain(value.as_json())
+        named = {f.metadata.get("json", f.name): getattr(value, f.name) for f in dataclasses.fields(value)}
+        return plain(named)
     if isinstance(value, dict) or hasattr(value, "items"):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple | np.ndarray):

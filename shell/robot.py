@@ -39,6 +39,7 @@ from palpate.scenes.laboratory.simulate import Simulation, simulate
 from palpate.scenes.laboratory.support_and_air import on_the_support, waving
 from palpate.scenes.laboratory.tracing import RATE_HZ
 from palpate.scenes.phantoms import Phantom
+from palpate.words import mm
 
 MOST_CHARACTERS = 64_000_000
 """Of one line: a minute at 1 kHz takes some 8 million."""
@@ -276,7 +277,7 @@ class LaboratoryRobot:
         normal = surface.face_normals[face]
         if point[2] < 0.004:
             raise SceneError(
-                f"a touch {1e3 * point[2]:.1f} mm above the support would press the support: choose a "
+                f"a touch {mm(point[2], '.1f')} above the support would press the support: choose a "
                 "higher place"
             )
         if -way @ normal < np.cos(np.radians(35)):

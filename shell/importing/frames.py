@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from palpate.importing.mapping import Column, Said
 from palpate.importing.meaning import MOST_ODDS, Unclear, best, force_sense, press_scores
 from palpate.mechanics.errors import RecordingError
+from palpate.words import mm
 
 GRAVITY_M_PER_S2 = 9.80665
 
@@ -43,7 +44,7 @@ def framed(
                     f"flange_to_tip_m is {said.flange_to_tip_m}; it must be three numbers X,Y,Z"
                 )
             position = position + turned.apply(arm)
-            notes.append(f"tip's centre {1e3 * np.linalg.norm(arm):.4g} mm off the stated position")
+            notes.append(f"tip's centre {mm(float(np.linalg.norm(arm)), '.4g')} off the stated position")
     if said.mass_kg:
         sign = -1.0 if said.force_on == "object" else 1.0
         force = force + sign * np.array([0.0, 0.0, said.mass_kg * GRAVITY_M_PER_S2])

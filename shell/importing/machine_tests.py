@@ -24,6 +24,7 @@ from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.plausible import MACHINE_TIP_RADIUS
 from palpate.reconstruction.machine_curves.indentation import read_chiaro
 from palpate.reconstruction.machine_curves.uniaxial import of_compression, read_tension
+from palpate.words import mm
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
@@ -115,7 +116,7 @@ def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCur
         radii = {stated_radius(p) for p in others if p.suffix.lower() in _SAYING} - {None}
         tip_radius_m = radii.pop() if len(radii) == 1 else None
         if tip_radius_m is not None:
-            notes.append(f"tip radius {1e3 * tip_radius_m:.4g} mm, as the file says")
+            notes.append(f"tip radius {mm(tip_radius_m, '.4g')}, as the file says")
     if tip_radius_m is None:
         raise Unclear("the tip's radius in m is in no file", "tip_radius_m", ())
     low, high = MACHINE_TIP_RADIUS.low, MACHINE_TIP_RADIUS.high

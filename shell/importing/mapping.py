@@ -32,6 +32,7 @@ from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import MACHINE_TIP_RADIUS, TOOL_MASS
 from palpate.mechanics.recording.files import SCHEMA
+from palpate.words import listed
 
 ROLES = ("t", "x", "y", "z", "fx", "fy", "fz", "qw", "qx", "qy", "qz")
 KIND = {"t": "time", **dict.fromkeys("xyz", "position"), **dict.fromkeys(("fx", "fy", "fz"), "force")}
@@ -88,9 +89,7 @@ class Said:
             ("frame", self.frame, ("device", "tool")),
         ):
             if value not in allowed:
-                raise RecordingError(
-                    f"{name} is {value!r}; allowed are {' and '.join(filter(None, allowed))}"
-                )
+                raise RecordingError(f"{name} is {value!r}; allowed are {listed(filter(None, allowed))}")
         for role in self.columns:
             if role not in ROLES:
                 raise RecordingError(f"'{role}' is no column of a recording; allowed are {', '.join(ROLES)}")

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.mechanics.errors import RecordingError
+from palpate.words import listed
 
 LEAST_ODDS = 9.0
 MOST_ODDS = 1e6
@@ -34,7 +35,7 @@ class Unclear(RecordingError):
     def __init__(self, question: str, option: str, choices: Sequence[str]) -> None:
         self.question, self.option, self.choices = question, option, tuple(choices)
         flag = "--" + option.removesuffix("_m").replace("_", "-")
-        either = " or ".join(f"{flag} {choice}" for choice in choices)
+        either = listed((f"{flag} {choice}" for choice in choices), "or")
         super().__init__(f"{question}: say {either or flag + ' NUMBER'}")
 
 

@@ -45,6 +45,7 @@ from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
 from palpate.output import Output
 from palpate.render.registry import check_settings
+from palpate.words import mn, spaced
 
 if TYPE_CHECKING:
     from palpate.diagnosis.other_simulator.result import SimulatedGap
@@ -122,14 +123,14 @@ def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
         better = found.model.save(asked.apply)
         kept = [name for name in own.effects if name in better.effects]
         out.say(f"improved model ({', '.join(kept) or 'modulus only'}): {asked.apply}")
-        before, after = (f"{1e3 * gap:.3g} mN" for gap in (found.given_n, found.improved_n))
+        before, after = (mn(gap, ".3g") for gap in (found.given_n, found.improved_n))
         out.say(f"  replayed over the recording its force is {after} off, the given model's {before}")
         for name in found.left_out:
-            out.say(f"  {name.replace('_', ' ')} is left out: with it the replayed force was farther off")
+            out.say(f"  {spaced(name)} is left out: with it the replayed force was farther off")
     if asked.corrected:
         own.corrected().save(asked.corrected)
         for name in unsure(own):
-            out.say(f"{name.replace('_', ' ')}: smaller than twice its own error, not taken off")
+            out.say(f"{spaced(name)}: smaller than twice its own error, not taken off")
         out.say(f"corrected recording: {asked.corrected}")
     if asked.report:
         out.say(f"report: {result.report(asked.report)}")

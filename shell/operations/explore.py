@@ -39,6 +39,7 @@ from palpate.operations._shared import (
 from palpate.operations.simulate import effects_from
 from palpate.output import Output
 from palpate.robot import RobotOptions
+from palpate.words import kpa, mm
 
 if TYPE_CHECKING:
     from palpate.window.guide import Guide
@@ -129,8 +130,8 @@ def _explorer(
     made = Explorer.going_on(recording, goals, reach, poisson_ratio=nu, seed=asked.seed)
     if not np.isclose(made.instrument.tip_radius_m, instrument.tip_radius_m, rtol=0.01):
         raise OptionError(
-            f"{asked.going_on} was explored with a tip of {1e3 * made.instrument.tip_radius_m:.2f} mm, "
-            f"this one has {1e3 * instrument.tip_radius_m:.2f} mm: go on with the same tip"
+            f"{asked.going_on} was explored with a tip of {mm(made.instrument.tip_radius_m, '.2f')}, "
+            f"this one has {mm(instrument.tip_radius_m, '.2f')}: go on with the same tip"
         )
     return made
 
@@ -215,9 +216,9 @@ def _line(suggestion: Suggestion, state: ExplorationState) -> str:
     known = "nothing is known yet"
     if state.presses and state.surface:
         known = (
-            f"{state.made} presses, {state.seconds:.0f} s: {state.modulus_pa / 1e3:.1f} kPa "
+            f"{state.made} presses, {state.seconds:.0f} s: {kpa(state.modulus_pa, '.1f')} "
             f"({state.modulus_ci95_pa[0] / 1e3:.1f} to {state.modulus_ci95_pa[1] / 1e3:.1f}), "
-            f"surface within {1e3 * state.surface_error_m:.1f} mm"
+            f"surface within {mm(state.surface_error_m, '.1f')}"
         )
     if state.causes is not None:
         likeliest, *others = state.causes.not_ruled_out(state.cause_at)
@@ -226,6 +227,6 @@ def _line(suggestion: Suggestion, state: ExplorationState) -> str:
         return f"{known}; {suggestion.kind}: {suggestion.why}"
     x, y, z = (1e3 * float(v) for v in suggestion.point)
     return (
-        f"{known}; press at ({x:.0f}, {y:.0f}, {z:.0f}) mm, {1e3 * suggestion.depth_m:.1f} mm deep: "
+        f"{known}; press at ({x:.0f}, {y:.0f}, {z:.0f}) mm, {mm(suggestion.depth_m, '.1f')} deep: "
         f"{suggestion.why}"
     )

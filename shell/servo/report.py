@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from palpate.devices.safety import WORDS, reason_words
+from palpate.output import plain
 from palpate.render.passivity import DISSIPATED, LEAST
 from palpate.servo.histogram import Histogram
 from palpate.servo.layout import (
@@ -38,8 +39,8 @@ class ServoReport:
     rate_hz: float
     missed_ticks: int
     late_ticks: int
-    compute: Histogram
-    lateness: Histogram
+    compute: Histogram = field(metadata={"json": "compute_us"})
+    lateness: Histogram = field(metadata={"json": "lateness_us"})
     peak_rendered_n: float
     peak_force_n: float
     contact_share: float
@@ -52,13 +53,7 @@ class ServoReport:
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        table: dict[str, Any] = {}
-        for name in (f.name for f in fields(self)):
-            value = getattr(self, name)
-            if isinstance(value, Histogram):
-                table[f"{name}_us"] = value.summary()
-            else:
-                table[name] = list(value) if isinstance(value, tuple) else value
+        table: dict[str, Any] = plain(self)
         return table
 
     def __str__(self) -> str:

@@ -1,15 +1,13 @@
 """How results look: in lines, as a plot (matplotlib), in 3D (PyVista), as an HTML page; one module a kind.
 
-A module has those of these functions that its result needs, each with the result first:
+A module has those of these that its result needs:
 
-    lines(result) -> list[str]             what `print` says, with units
-    as_json(result) -> dict                the figures of the command's --json
+    story(result, **more) -> blocks        what it has to say, once (`show.story`), for terminal and page;
+                                           first the page's Title, where there is a page
+    KEYS                                   of the command's --json (`story.Key`)
     draw(result, ax)                       the one plot
     place(result, plotter)                 into a 3D scene, device frame, m
     view(result) -> View | None            the object to be turned, in pages and notebooks
-    report(result, path, **more) -> Path   the HTML page
-    tell(result, page)                     its part of a page, of a file that was opened
-    next_steps(result) -> list[str]        what to do with it; commands between backticks
     save(result, path)                     what reads it back, where its own class does not write it
 
 `register(TYPE, module)` adds one. Importing this package lets every result know; a module is imported when a
@@ -19,7 +17,6 @@ result of its type is first printed or drawn, matplotlib and PyVista when one is
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -27,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.child import loaded_whole
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.result import Result, present_by
+from palpate.show.story import Story, Title, figures_of, lines_of, steps_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,44 +81,40 @@ def _loaded(name: str) -> ModuleType:
         return importlib.import_module(name)
 
 
-def _function(result: Result, name: str, words: str) -> Callable[..., Any]:
+def _function(result: Result, name: str, words: str) -> Any:
     found = getattr(_module_of(result), name, None)
     if found is None:
         raise OptionError(f"a {type(result).__name__} has no {words}")
     return found
 
 
-def telling(result: Result) -> Callable[..., None] | None:
-    """What puts a result into a page; None where its module has none."""
-    return getattr(_module_of(result), "tell", None)
+def story_of(result: Result, **more: Any) -> Story:
+    """What a result has to say. more: what its kind's `story` takes beside."""
+    return _function(result, "story", "words")(result, **more)
 
 
 def next_lines(result: Result, **more: Any) -> list[str]:
-    """What a terminal says last: what to do with a result, a step a line; nothing where its module says
-    none. more: what its `next_steps` takes beside."""
-    return [
-        f"{'next:' if k == 0 else '     '} {step.replace('`', '')}"
-        for k, step in enumerate(steps_of(result, **more))
-    ]
+    """What a terminal says last: what to do with a result, a step a line; nothing where its story says none.
+    more: what its kind's `story` takes beside."""
+    steps = steps_of(story_of(result, **more)) if _has_story(result) else []
+    return [f"{'next:' if k == 0 else '     '} {step.replace('`', '')}" for k, step in enumerate(steps)]
 
 
-def steps_of(result: Result, **more: Any) -> list[str]:
-    """What to do with a result, commands between backticks; none of one that says its own lines."""
+def _has_story(result: Result) -> bool:
     try:
-        module = _module_of(result)
-    except OptionError:
-        return []
-    return getattr(module, "next_steps", lambda _: [])(result, **more)
+        return hasattr(_module_of(result), "story")
+    except OptionError:  # it says its own lines
+        return False
 
 
 class _Presenter:
     """Asks the module of a result's type (`mechanics.result.Presenter`)."""
 
     def lines(self, result: Result) -> list[str]:
-        return _function(result, "lines", "words")(result)
+        return lines_of(story_of(result))
 
     def as_json(self, result: Result) -> dict[str, Any]:
-        return _function(result, "as_json", "figures for JSON")(result)
+        return figures_of(result, _function(result, "KEYS", "figures for JSON"))
 
     def plot(self, result: Result, ax: Axes | None) -> Axes:
         draw = _function(result, "draw", "plot")
@@ -157,9 +151,14 @@ class _Presenter:
         return None if found is None else found(result)
 
     def report(self, result: Result, path: Path | str, **more: Any) -> Path:
-        page = _function(result, "report", "page")
+        from palpate.show.page import page_of
+
+        story = iter(_function(result, "story", "page")(result, **more))
+        title = next(story, None)
+        if not isinstance(title, Title):
+            raise OptionError(f"a {type(result).__name__} has no page")
         _loaded("matplotlib.backends.backend_agg")
-        return page(result, path, **more)
+        return page_of(title, story, result.as_json(), path)
 
     def save(self, result: Result, path: Path | str) -> Any:
         return _function(result, "save", "file of its own")(result, path)

@@ -8,6 +8,8 @@ import numpy as np
 
 from palpate.mechanics.quantities import fitting_unit
 from palpate.mechanics.recording.calibration import Calibration
+from palpate.show.story import Detail, Headline, Story
+from palpate.words import sure, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,29 +22,24 @@ _SHOWN = {
 }
 
 
-def lines(result: Calibration) -> list[str]:
-    """What `print` says, with units."""
-    text = [
+def story(result: Calibration) -> Story:
+    """Each quantity that was found, with its interval."""
+    yield Headline(
         f"calibrated on {result.about.get('on', 'something')}, {result.about.get('presses', '?')} presses"
-    ]
+    )
     for key, words in _SHOWN.items():
-        value = getattr(result, key)
-        between = result.interval.get(key)
+        value, between = getattr(result, key), result.interval.get(key)
         if value is not None:
             unit, scale = fitting_unit(key, value)
-            within = ""
-            if between is not None:
-                within = f" (95 % sure: {scale * between[0]:.4g} to {scale * between[1]:.4g})"
-            text.append(f"  {words}: {scale * value:.4g} {unit}{within}")
+            within = "" if between is None else f" ({sure(*(f'{scale * end:.4g}' for end in between))})"
+            yield Detail(f"{words}: {with_unit(value, unit, scale)}{within}")
     if result.matrix is not None:
         rows = ["[" + ", ".join(f"{v:.3f}" for v in row) + "]" for row in np.asarray(result.matrix)]
-        text.append(f"  sensor: read = [{', '.join(rows)}] true")
+        yield Detail(f"sensor: read = [{', '.join(rows)}] true")
     if result.bias_n is not None:
-        text.append(f"  bias: {', '.join(f'{v:.4f}' for v in result.bias_n)} N")
-    absent = result.about.get("not_told", [])
-    if absent:
-        text.append(f"  not found or not told: {', '.join(absent)}")
-    return text
+        yield Detail(f"bias: {', '.join(f'{v:.4f}' for v in result.bias_n)} N")
+    if absent := result.about.get("not_told", []):
+        yield Detail(f"not found or not told: {', '.join(absent)}")
 
 
 def draw(result: Calibration, ax: Axes) -> None:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.diagnosis.compare.before_after import Changes, Side
+from palpate.diagnosis.compare.before_after import Changes
+from palpate.show import story as say
 from palpate.show.diagnosis.words import verdict
 from palpate.show.model import thing_of, usual_colourings
-from palpate.show.page import Page, file_words, new_figure
+from palpate.show.page import drawn, file_words
 from palpate.show.quantities import ShownQuantity
 from palpate.show.scenery import add_dots, add_object
 from palpate.show.view3d import Colouring, View
+from palpate.words import begun, kpa, listed, spaced, sure, sure_kpa
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,68 +25,108 @@ _COLOURS = ("#1d3557", "#c1121f")
 _RATIO = ShownQuantity("second over first modulus", "", 1.0, "coolwarm", least_share=0.2)
 
 
-def lines(result: Changes) -> list[str]:
-    """What `print` says, with units."""
-    text = [result.summary]
-    for side, words in ((result.before, "first"), (result.after, "second")):
-        low, high = side.model.material.young_modulus_ci95_pa
-        named = f"; {verdict(side.diagnosis)}" if side.diagnosis is not None else ""
-        text.append(
-            f"{words}, {side.recording.name}: {side.modulus_pa / 1e3:.2f} kPa (95 % sure: "
-            f"{low / 1e3:.2f} to {high / 1e3:.2f} kPa){named}"
-        )
-    low, high = result.difference_ci95_pa
-    text.append(
-        f"difference {result.difference_pa / 1e3:+.2f} kPa (95 % sure: {low / 1e3:+.2f} to {high / 1e3:+.2f})"
-    )
+def story(result: Changes) -> say.Story:
+    """What differs, and what explains it."""
+    yield say.Title(f"Before and after: {result.before.recording.name} and {result.after.recording.name}")
+    yield say.Headline(result.summary, on=say.TEXT)
+    yield say.Headline(begun(result.summary), on=say.PAGE)
+    yield say.Next(_next_steps(result))
+    yield from _moduli(result)
     if result.places:
         apart = [p for p in result.places if not p.ci95[0] <= 1 <= p.ci95[1]]
         ratios = np.array([p.ratio for p in result.places])
-        text.append(
+        yield say.TextLine(
             f"{len(result.places)} places that both pressed: ratio {ratios.min():.2f} to "
             f"{ratios.max():.2f}, {len(apart)} of them beyond their interval"
         )
-    return [*text, *(f"  {reason}" for reason in result.reasons)]
+    yield say.Cards(_cards(result))
+    picture = cache(lambda: drawn(draw, result, 8, 3.4, layout=None))
+    ratio = "The ratio at every place that both pressed"
+    yield say.Turned(
+        lambda: view(result),
+        say.Picture(picture, f"{ratio}." if result.places else "Moduli, 95 % sure."),
+        result.before.model,
+    )
+    yield say.Section("Both by themselves", _both(result))
+    yield from map(say.Note, result.reasons)
+    bars = ratio if result.places else "Both moduli"
+    yield say.Picture(picture, f"{bars}, 95 % sure within the bars.")
 
 
-def as_json(result: Changes) -> dict[str, Any]:
-    """The figures of `palpate compare REC REC2 --json`."""
+def _moduli(result: Changes) -> say.Story:
+    for side, words in ((result.before, "first"), (result.after, "second")):
+        interval = sure_kpa(side.model.material.young_modulus_ci95_pa)
+        named = f"; {verdict(side.diagnosis)}" if side.diagnosis is not None else ""
+        yield say.TextLine(f"{words}, {side.recording.name}: {kpa(side.modulus_pa)} ({interval}){named}")
+    low, high = result.difference_ci95_pa
+    interval = sure(f"{low / 1e3:+.2f}", f"{high / 1e3:+.2f}")
+    yield say.TextLine(f"difference {kpa(result.difference_pa, '+.2f')} ({interval})")
 
-    def side(each: Side) -> dict[str, Any]:
-        verdict = None
-        if each.diagnosis is not None:
-            d = each.diagnosis
-            verdict = {"kind": d.kind, "effects": list(d.effects), "candidates": list(d.candidates)}
-        return {
-            "recording": each.recording.name,
-            "young_modulus_pa": each.modulus_pa,
-            "young_modulus_ci95_pa": list(each.model.material.young_modulus_ci95_pa),
-            "beside_effects_pa": each.beside_effects_pa,
-            "verdict": verdict,
-        }
 
-    return {
-        "before": side(result.before),
-        "after": side(result.after),
-        "ratio": result.ratio,
-        "ratio_ci95": list(result.ratio_ci95),
-        "difference_pa": result.difference_pa,
-        "difference_ci95_pa": list(result.difference_ci95_pa),
-        "differs": result.differs,
-        "ratio_beside_effects": None if result.beside is None else result.beside[0],
-        "ratio_beside_effects_ci95": None if result.beside is None else list(result.beside[1]),
-        "places": [
-            {
-                **dict(zip("xyz", map(float, p.point), strict=True)),
-                "ratio": p.ratio,
-                "ratio_ci95": list(p.ci95),
-            }
-            for p in result.places
-        ],
-        "explained_by": list(result.explained_by),
-        "shifted": result.shifted,
-        "reasons": list(result.reasons),
-    }
+def _cards(result: Changes) -> list[tuple[str, str, str]]:
+    low, high = (100 * (r - 1) for r in result.ratio_ci95)
+    cause, beside = "not asked", "a diagnosis of both would tell"
+    if result.before.diagnosis is not None:
+        named = [spaced(n.replace("young_modulus", "Young's modulus")) for n in result.explained_by]
+        cause, beside = listed(named) or "nothing", ""
+    if result.beside is not None:
+        left = 100 * (result.beside[0] - 1)
+        beside = f"with the effects of both taken in, the moduli differ by {left:+.0f} %"
+    there = ("no shared places", "the two recordings share too few places, or no frame")
+    if result.places:
+        there = (
+            f"{len(result.places)} shared places",
+            "places within 12 mm of one another, each with its own ratio",
+        )
+    differ = "yes" if result.differs else "not beyond their intervals"
+    interval = sure(f"{low:+.0f}", f"{high:+.0f} %")
+    size = f"second modulus less the first: {100 * (result.ratio - 1):+.0f} % ({interval})"
+    return [
+        ("Do they differ?", differ, size),
+        ("What explains it?", cause, beside),
+        ("Where?", *there),
+    ]
+
+
+def _both(result: Changes) -> say.Story:
+    rows = []
+    for side in (result.before, result.after):
+        interval = side.model.material.young_modulus_ci95_pa
+        said = verdict(side.diagnosis) if side.diagnosis is not None else "not diagnosed"
+        kilo = (v / 1e3 for v in (side.modulus_pa, *interval, side.beside_effects_pa))
+        rows.append([side.recording.name, *kilo, said])
+    heads = ["recording", "modulus [kPa]", "95 % sure: from", "to", "with its effects [kPa]", "verdict"]
+    yield say.Rows(heads, rows)
+
+
+_VERDICT: tuple[say.Key, ...] = ("kind", "effects", "candidates")
+_SIDE: tuple[say.Key, ...] = (
+    "recording=recording.name",
+    "young_modulus_pa=modulus_pa",
+    "young_modulus_ci95_pa=model.material.young_modulus_ci95_pa",
+    "beside_effects_pa",
+    ("verdict", lambda side: None if side.diagnosis is None else say.figures_of(side.diagnosis, _VERDICT)),
+)
+_PLACE: tuple[say.Key, ...] = (
+    lambda place: dict(zip("xyz", place.point, strict=True)),
+    "ratio",
+    "ratio_ci95=ci95",
+)
+KEYS: tuple[say.Key, ...] = (
+    ("before", lambda result: say.figures_of(result.before, _SIDE)),
+    ("after", lambda result: say.figures_of(result.after, _SIDE)),
+    "ratio",
+    "ratio_ci95",
+    "difference_pa",
+    "difference_ci95_pa",
+    "differs",
+    ("ratio_beside_effects", lambda result: None if result.beside is None else result.beside[0]),
+    ("ratio_beside_effects_ci95", lambda result: None if result.beside is None else result.beside[1]),
+    ("places", lambda result: [say.figures_of(place, _PLACE) for place in result.places]),
+    "explained_by",
+    "shifted",
+    "reasons",
+)
 
 
 def place(result: Changes, plotter: Plotter) -> None:
@@ -97,57 +139,6 @@ def place(result: Changes, plotter: Plotter) -> None:
         )
 
 
-def report(result: Changes, path: Path | str) -> Path:
-    """One self-contained page; returns its path."""
-    page = Page(f"Before and after: {result.before.recording.name} and {result.after.recording.name}")
-    page.lead(result.summary[:1].upper() + result.summary[1:] + ".")
-    low, high = (100 * (r - 1) for r in result.ratio_ci95)
-    named = [n.replace("young_modulus", "Young's modulus").replace("_", " ") for n in result.explained_by]
-    cause, beside = "not asked", "a diagnosis of both would tell"
-    if result.before.diagnosis is not None:
-        cause, beside = " and ".join(named) or "nothing", ""
-    if result.beside is not None:
-        left = 100 * (result.beside[0] - 1)
-        beside = f"with the effects of both taken in, the moduli differ by {left:+.0f} %"
-    page.next_steps(next_steps(result))
-    page.cards([
-        ("Do they differ?", "yes" if result.differs else "not beyond their intervals",
-         f"second modulus less the first: {100 * (result.ratio - 1):+.0f} % (95 % sure: {low:+.0f} to "
-         f"{high:+.0f} %)"),
-        ("What explains it?", cause, beside),
-        ("Where?", f"{len(result.places)} shared places" if result.places else "no shared places",
-         "places within 12 mm of one another, each with its own ratio" if result.places
-         else "the two recordings share too few places, or no frame"),
-    ])  # fmt: skip
-    figure = new_figure(8, 3.4)
-    draw(result, figure.subplots())
-    page.view(
-        view(result),
-        figure,
-        "The ratio at every place that both pressed." if result.places else "Moduli, 95 % sure.",
-        result.before.model,
-    )
-    rows = []
-    for side in (result.before, result.after):
-        interval = side.model.material.young_modulus_ci95_pa
-        said = verdict(side.diagnosis) if side.diagnosis is not None else "not diagnosed"
-        kilo = (v / 1e3 for v in (side.modulus_pa, *interval, side.beside_effects_pa))
-        rows.append([side.recording.name, *kilo, said])
-    page.heading("Both by themselves")
-    heads = ["recording", "modulus [kPa]", "95 % sure: from", "to", "with its effects [kPa]", "verdict"]
-    page.table(heads, rows)
-    for reason in result.reasons:
-        page.paragraph(reason[:1].upper() + reason[1:] + ".")
-    page.figure(
-        figure,
-        "The ratio at every place that both pressed, 95 % sure within the bars."
-        if result.places
-        else "Both moduli, 95 % sure within the bars.",
-    )
-    page.result(as_json(result))
-    return page.write(path)
-
-
 def view(result: Changes) -> View:
     """The first's object, coloured by the ratio at places that both pressed, else by its own moduli."""
     model = result.before.model
@@ -158,8 +149,7 @@ def view(result: Changes) -> View:
     return View(thing_of(model), np.array([place.point for place in result.places]), [ratio])
 
 
-def next_steps(result: Changes) -> list[str]:
-    """What to do with the answer."""
+def _next_steps(result: Changes) -> list[str]:
     first = file_words(result.before.recording.path, "REC")
     second = file_words(result.after.recording.path, "REC2")
     if result.before.diagnosis is None:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.checks.finding import Checkup, Finding
 from palpate.reconstruction.checks.samples import CHANNELS
-from palpate.show.page import Page, file_words, subplots
+from palpate.show import story as say
+from palpate.show.page import drawn, file_words, subplots
 from palpate.show.quantities import readable
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.show.scenery import add_path, look_around
+from palpate.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,24 +27,47 @@ _MOST = 8000
 _MARGIN = 0.35
 
 
-def lines(result: Checkup) -> list[str]:
-    """What `print` says, with units."""
-    found, grave = len(result.findings), len(result.grave)
+def story(result: Checkup) -> say.Story:
+    """The findings, each with its stretch."""
+    yield say.Title(f"Check-up of {result.recording.name}", suffixed=True, pictures="own")
+    recording, findings = result.recording, result.findings
     looked = "samples, presses and modulus" if result.full else "samples and presses"
-    head = f"{result.recording.name}, {result.recording.duration_s:.1f} s: "
-    if not found:
-        return [f"{head}nothing to find fault with in its {looked}"]
-    return [f"{head}{found} finding{'s' * (found > 1)}, {grave} grave", *(f.line() for f in result.findings)]
+    said = f"{counted(len(findings), 'finding')}, {len(result.grave)} grave"
+    said = said if findings else f"nothing to find fault with in its {looked}"
+    yield say.Headline(f"{recording.name}, {recording.duration_s:.1f} s: {said}")
+    yield say.Sentence(_meaning(result), on=say.PAGE)
+    yield say.Next(_next_steps(result))
+    yield from (say.TextLine(finding.line()) for finding in findings)
+    if findings:
+        yield say.Rows(
+            ["finding", "grave", "adds to the modulus's error", "how sure"],
+            [[f.name, "grave" if f.grave else "-", _share(f.error), f.sure] for f in findings],
+        )
+    shaded = "; the stretches of the findings are shaded" if findings else ""
+    yield say.Picture(
+        lambda: drawn(draw, result, 10, 3), f"Force over the whole recording{shaded}.", name="whole"
+    )
+    for k, finding in enumerate(findings, 1):
+        yield say.Section(
+            f"{k}. {finding.name}{' (grave)' if finding.grave else ''}", _found(recording, finding, k)
+        )
+    yield say.Section("What was measured", [
+        say.Rows(["quantity", "here", "usual"], (_seen(*row) for row in result.seen))
+    ])  # fmt: skip
 
 
-def as_json(result: Checkup) -> dict[str, Any]:
-    """The figures of `palpate check --json`, keys with units."""
-    return {
-        "recording": result.recording.name,
-        "grave": len(result.grave),
-        "findings": [f.as_json() for f in result.findings],
-        "seen": [{"what": words, "value": value, "usual": usual} for words, value, usual in result.seen],
-    }
+def _found(recording: Recording, finding: Finding, number: int) -> say.Story:
+    yield say.Sentence(finding.saw)
+    yield say.Sentence(f"How sure: {finding.sure}. What to do: {finding.todo}")
+    yield say.Picture(lambda: stretch_figure(recording, finding), _caption(finding), name=f"finding-{number}")
+
+
+KEYS: tuple[say.Key, ...] = (
+    "recording=recording.name",
+    ("grave", lambda result: len(result.grave)),
+    "findings",
+    ("seen", lambda result: [dict(zip(("what", "value", "usual"), row, strict=True)) for row in result.seen]),
+)
 
 
 def place(result: Checkup, plotter: Plotter) -> None:
@@ -74,42 +98,6 @@ def draw(result: Checkup, ax: Axes) -> None:
     ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(recording.t[0], recording.t[-1]))
 
 
-def report(result: Checkup, path: Path | str) -> Path:
-    """Write the page, and its figures as PNGs into the folder PATH without suffix; returns its path."""
-    path = Path(path)
-    path = path if path.suffix else path.with_suffix(".html")
-    page = Page(f"Check-up of {result.recording.name}")
-    page.save(path.with_suffix(""), tell(result, page))
-    page.result(as_json(result))
-    return page.write(path)
-
-
-def tell(result: Checkup, page: Page) -> dict[str, Figure]:
-    """The findings, each with its stretch, into a page; returns the pictures by name."""
-    figures = {f"finding-{k + 1}": stretch_figure(result.recording, f) for k, f in enumerate(result.findings)}
-    whole, ax = subplots(1, 1, figsize=(10, 3))
-    draw(result, ax)
-    figures["whole"] = whole
-    page.lead(lines(result)[0] + ".")
-    page.paragraph(_meaning(result))
-    page.next_steps(next_steps(result))
-    if result.findings:
-        page.table(
-            ["finding", "grave", "adds to the modulus's error", "how sure"],
-            [[f.name, "grave" if f.grave else "-", _share(f.error), f.sure] for f in result.findings],
-        )
-    shaded = "; the stretches of the findings are shaded" if result.findings else ""
-    page.figure(whole, f"Force over the whole recording{shaded}.")
-    for k, finding in enumerate(result.findings):
-        page.heading(f"{k + 1}. {finding.name}{' (grave)' if finding.grave else ''}")
-        page.paragraph(f"{finding.saw[0].upper()}{finding.saw[1:]}.")
-        page.paragraph(f"How sure: {finding.sure}. What to do: {finding.todo}.")
-        page.figure(figures[f"finding-{k + 1}"], _caption(finding))
-    page.heading("What was measured")
-    page.table(["quantity", "here", "usual"], [_seen(*row) for row in result.seen])
-    return figures
-
-
 def _seen(words: str, here: float, usual: float) -> list[object]:
     label, values = readable(words, [here, usual])
     return [label, *values]
@@ -123,8 +111,7 @@ def _meaning(result: Checkup) -> str:
     return "The modulus's interval is widened by what was found; the model can be made as it is."
 
 
-def next_steps(result: Checkup) -> list[str]:
-    """What to do with the answer."""
+def _next_steps(result: Checkup) -> list[str]:
     if grave := [f.todo for f in result.findings if f.grave]:
         return grave[:1]
     return [f"make a model of it: `palpate reconstruct {file_words(result.recording.path, 'REC')} -o MODEL`"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,7 +11,9 @@ from palpate.mechanics.errors import OptionError
 from palpate.render.base import Renderer
 from palpate.render.force_error import said
 from palpate.render.press import Curve
+from palpate.show import story as say
 from palpate.show.page import file_words
+from palpate.words import kpa, mm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,57 +22,57 @@ if TYPE_CHECKING:
     from palpate.render.exact import SolvedPlace
 
 
-def lines(result: Curve) -> list[str]:
-    """What `print` says, with units."""
+def story(result: Curve, written: str | None = None) -> say.Story:
+    """How it answers the press. written: the curve's file."""
     depth = float(result.depth.max())
     if result.renderer is None:
-        return [f"a curve that was read: {result.peak_force_n:.4g} N at most, {depth * 1e3:.3g} mm deep"]
+        yield say.Headline(f"a curve that was read: {result.peak_force_n:.4g} N at most, {mm(depth)} deep")
+        return
     force = ", ".join(f"{round(float(f), 3) + 0.0:g}" for f in result.force_at(depth))
     normal = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in np.asarray(result.normal))
-    modulus = result.renderer.model.material.young_modulus_pa / 1e3
-    return [
-        f"{result.renderer.name}: {result.peak_force_n:.3g} N at most; {depth * 1e3:.3g} mm deep the force "
-        f"on the tool is ({force}) N",
-        f"  the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s; "
-        f"the object's Young's modulus is {modulus:.4g} kPa",
-        *([f"  {words}"] if (words := said(result.error_figures)) else []),
-        *(_solved(result.exact) if result.exact is not None else []),
-    ]
+    made = result.renderer.model
+    yield say.Headline(
+        f"{result.renderer.name}: {result.peak_force_n:.3g} N at most; {mm(depth)} deep the force on the "
+        f"tool is ({force}) N"
+    )
+    yield say.Detail(
+        f"the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s; the object's "
+        f"Young's modulus is {kpa(made.material.young_modulus_pa, '.4g')}"
+    )
+    if words := said(result.error_figures):
+        yield say.Detail(words)
+    if result.exact is not None:
+        yield from _solved(result.exact)
+    model = file_words(made.path, "MODEL")
+    later = "see whether it stays so: press with `-o CURVE.csv`, later with `--expect CURVE.csv`"
+    if written is not None:
+        later = f"see later whether it stays so: the same press with `--expect {written}`"
+    yield say.Next([f"feel it: `palpate touch {model}`", later])
 
 
-def _solved(exact: SolvedPlace) -> list[str]:
+def _solved(exact: SolvedPlace) -> say.Story:
     """Law, solution and bound along the depth."""
+    yield say.Detail("solved here, along the normal; the forces above are by it")
     rows = zip(1e3 * exact.depth_m, exact.law_n, exact.solved_n, exact.error_n, strict=True)
-    return [
-        "  solved here, along the normal; the forces above are by it",
-        "    depth [mm]   law [N]   solved [N]   the law may be off by [N]",
-        *(f"    {d:10.2f}{law:10.3f}{solved:13.3f}{bound:12.3f}" for d, law, solved, bound in rows),
-    ]
+    yield solved_rows("depth [mm]", rows)
 
 
-def next_steps(result: Curve, written: str | None = None) -> list[str]:
-    """What to do with a model's curve; nothing with one that was read. written: its file."""
-    if result.renderer is None:
-        return []
-    model = file_words(result.renderer.model.path, "MODEL")
-    feel = f"feel it: `palpate touch {model}`"
-    if written is None:
-        return [feel, "see whether it stays so: press with `-o CURVE.csv`, later with `--expect CURVE.csv`"]
-    return [feel, f"see later whether it stays so: the same press with `--expect {written}`"]
+def solved_rows(depth: str, rows: Iterable[tuple[float, float, float, float]]) -> say.Rows:
+    """Of solved places: depth (mm; so called), law, solution and bound, N."""
+    header = (f"    {depth}", "law [N]", "solved [N]", "the law may be off by [N]")
+    shown = [(f"{d:.2f}", f"{law:.3f}", f"{by:.3f}", f"{bound:.3f}") for d, law, by, bound in rows]
+    return say.Rows(header, shown, (len(header[0]), 10, 13, 12), on=say.TEXT)
 
 
-def as_json(result: Curve) -> dict[str, Any]:
-    """The figures of `palpate press --json`, keys with units."""
-    depth = float(result.depth.max())
-    return {
-        "renderer": _renderer(result).name,
-        "normal": result.normal,
-        "depth_m": depth,
-        "force_at_depth_n": result.force_at(depth),
-        "peak_force_n": result.peak_force_n,
-        **result.error_figures,
-        **({} if result.exact is None else {"exact": result.exact.as_json()}),
-    }
+KEYS: tuple[say.Key, ...] = (
+    ("renderer", lambda result: _renderer(result).name),
+    "normal",
+    ("depth_m", lambda result: result.depth.max()),
+    ("force_at_depth_n", lambda result: result.force_at(float(result.depth.max()))),
+    "peak_force_n",
+    lambda result: result.error_figures,
+    lambda result: {} if result.exact is None else {"exact": result.exact},
+)
 
 
 def draw(result: Curve, ax: Axes) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,21 +13,25 @@ from palpate.reconstruction.steps.s6_one_d import low_passed
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.servo.report import ServoReport
 from palpate.show import model as made
+from palpate.show import story as say
 from palpate.show.diagnosis.gaps import known
-from palpate.show.diagnosis.words import force_words, spoken, verdict
+from palpate.show.diagnosis.words import verdict
 from palpate.show.model import local, rms_by_press, usual_colourings, view_of_presses
-from palpate.show.page import Page, file_words, subplots
+from palpate.show.page import file_words, subplots
 from palpate.show.quantities import ERROR, UNCERTAINTY
 from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.scenery import Colours, draw_object, draw_touched
 from palpate.show.view3d import Colouring, Line, View
+from palpate.words import begun, force_words, kpa, mn, spoken, sure_kpa
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from pyvista import Plotter
 
-__all__ = ["as_json", "draw", "lines", "next_steps", "place", "report", "view"]
+    from palpate.mechanics.presses.table import Presses
+
+__all__ = ["KEYS", "draw", "place", "story", "view"]
 _STAGES = {
     "reconstruct": "from the recording to the model",
     "precompute": "how every place gives",
@@ -40,32 +44,81 @@ _STEP_S = 0.05
 """Between samples of one press of a diagnosis; what is longer lies between presses."""
 
 
-def lines(result: DemoResult) -> list[str]:
-    """What `print` says, with units."""
-    model = result.model
-    return [
-        f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.2f} kPa "
-        "(Young's modulus)",
-        f"its force is typically {force_words(result.replay_rmse_n)} off, in touches of "
-        f"{force_words(result.contact_force_rms_n)}",
-        f"a hand would have felt it at {result.servo.rate_hz:.0f} forces a second: of "
-        f"{result.servo.ticks + result.servo.missed_ticks} {result.servo.missed_ticks} were skipped, "
-        f"{result.servo.late_ticks} came late",
-        *([f"diagnosis: {verdict(result.diagnosis)}"] if result.diagnosis else []),
-    ]
+def story(result: DemoResult) -> say.Story:
+    """What was made, how its force compares, how the loop ran, what a simpler simulation leaves out."""
+    yield say.Title(f"Palpate: {result.recording.object_name}, touched and felt", pictures="beside")
+    model, servo = result.model, result.servo
+    presses, modulus = f"{len(model.presses)} presses", model.material.young_modulus_pa
+    off = f"typically {force_words(result.replay_rmse_n)} off, in touches of "
+    off += force_words(result.contact_force_rms_n)
+    felt = f"a hand would have felt it at {servo.rate_hz:.0f} forces a second"
+    yield say.Headline(f"{presses} became a model of {kpa(modulus)} (Young's modulus)", on=say.TEXT)
+    yield say.Headline(f"{presses} became a model that feels like the object: it is {off}", on=say.PAGE)
+    yield say.TextLine(f"its force is {off}")
+    missed = servo.missed_ticks
+    of = f"of {servo.ticks + missed} {missed} were skipped"
+    yield say.TextLine(f"{felt}: {of}, {servo.late_ticks} came late")
+    if result.diagnosis is not None:
+        yield say.TextLine(f"diagnosis: {verdict(result.diagnosis)}")
+    sure_of = sure_kpa(model.material.young_modulus_ci95_pa, ".1f")
+    yield say.Sentence(
+        f"{_meaning(result)} The object's stiffness: a Young's modulus of {kpa(modulus, '.1f')} "
+        f"({sure_of}{_truth(result)}). {begun(felt)}{f'; {of}' if missed else ', and none was skipped'}",
+        on=say.PAGE,
+    )
+    where = file_words(model.path, "MODEL")
+    yield say.Next([f"feel it: `palpate touch {where}`", "bring in your own recording: `palpate open FILE`"])
+    yield say.Turned(
+        lambda: view(result),
+        say.Picture(
+            lambda: object_figure(result),
+            "Left: where the object was touched, and its glued base. Right: how uncertain its shape is.",
+            name="object",
+        ),
+        model,
+    )
+    yield say.Section("Measured beside rendered", _presses(result))
+    if result.diagnosis is not None:
+        yield say.Section(
+            "What a simpler simulation would leave out", [say.Sentence(diagnosis_words(result))]
+        )
+    yield say.Section("What the hand did", [
+        say.Picture(
+            lambda: force_figure(result),
+            "Force over time: first the base is traced (phase I), then the object is pressed.",
+            name="force",
+        )
+    ])  # fmt: skip
+    yield say.Section("How it was made", _how(result))
 
 
-def as_json(result: DemoResult) -> dict[str, Any]:
-    """The figures of `palpate demo --json`."""
-    material = result.model.material
-    return {
-        "young_modulus_pa": material.young_modulus_pa,
-        "young_modulus_ci95_pa": material.young_modulus_ci95_pa,
-        "replay_rmse_n": result.replay_rmse_n,
-        "servo": result.servo.as_dict(),
-        "seconds": result.seconds,
-        "diagnosis": diagnosis_json(result.diagnosis),
-    }
+def _presses(result: DemoResult) -> say.Story:
+    yield say.Sentence("Three presses, from the lightest to the hardest")
+    yield say.Pictures([
+        say.Picture(partial(press_figure, result, i), f"Press {i + 1}.", name=f"press-{i + 1}")
+        for i in spread_presses(result)
+    ])  # fmt: skip
+
+
+def _how(result: DemoResult) -> say.Story:
+    surface = result.reconstruction.surface
+    yield say.Sentence(f"Shape: {surface.method}, {surface.reason}")
+    yield say.Rows(["the loop of 1000 forces a second", "against a simulated hand"], _loop(result.servo))
+    if words := sent_words(result.servo):
+        yield say.Sentence(words)
+    rows = [[_STAGES.get(name, name), f"{s:.1f}"] for name, s in result.seconds.items()]
+    yield say.Rows(["step", "time [s]"], rows)
+
+
+_DIAGNOSIS = ("verdict", "noise_n", "gap_before_n", "gap_after_n", "gap_closed")
+KEYS: tuple[say.Key, ...] = (
+    "young_modulus_pa=model.material.young_modulus_pa",
+    "young_modulus_ci95_pa=model.material.young_modulus_ci95_pa",
+    "replay_rmse_n",
+    "servo",
+    "seconds",
+    ("diagnosis", lambda result: diagnosis_json(result.diagnosis)),
+)
 
 
 def diagnosis_json(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
@@ -73,7 +126,7 @@ def diagnosis_json(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
     if diagnosis is None:
         return None
     whole = diagnosis.as_json()
-    return {key: whole[key] for key in ("verdict", "noise_n", "gap_before_n", "gap_after_n", "gap_closed")}
+    return {key: whole[key] for key in _DIAGNOSIS}
 
 
 def draw(result: DemoResult, ax: Axes) -> None:
@@ -84,68 +137,6 @@ def draw(result: DemoResult, ax: Axes) -> None:
 def place(result: DemoResult, plotter: Plotter) -> None:
     """The model."""
     made.place(result.model, plotter)
-
-
-def report(result: DemoResult, path: Path | str) -> Path:
-    """Write the page, and its pictures as PNGs beside it; returns the page's path."""
-    path = Path(path)
-    folder = path.parent
-    model, servo = result.model, result.servo
-    low, high = (v / 1e3 for v in model.material.young_modulus_ci95_pa)
-    page = Page(f"Palpate: {result.recording.object_name}, touched and felt")
-    page.lead(
-        f"{len(model.presses)} presses became a model that feels like the object: it is typically "
-        f"{force_words(result.replay_rmse_n)} off, in touches of {force_words(result.contact_force_rms_n)}."
-    )
-    page.paragraph(
-        f"{_meaning(result)} The object's stiffness: a Young's modulus of "
-        f"{model.material.young_modulus_pa / 1e3:.1f} kPa (95 % sure: {low:.1f} to {high:.1f} kPa"
-        f"{_truth(result)}). A hand would have felt it at {servo.rate_hz:.0f} forces a second"
-        f"{_missed(servo)}."
-    )
-    page.next_steps(next_steps(result))
-    drawn = figures(result)
-    saved = page.save(folder, drawn)
-    page.view(
-        view(result),
-        saved["object"],
-        "Left: where the object was touched, and its glued base. Right: how uncertain its shape is.",
-        result.model,
-    )
-    page.heading("Measured beside rendered")
-    page.paragraph("Three presses, from the lightest to the hardest.")
-    page.figures(
-        [(drawn[name], f"{name.replace('-', ' ').capitalize()}.") for name in drawn if "press-" in name]
-    )
-    if result.diagnosis is not None:
-        page.heading("What a simpler simulation would leave out")
-        page.paragraph(diagnosis_words(result))
-    page.heading("What the hand did")
-    page.figure(
-        drawn["force"], "Force over time: first the base is traced (phase I), then the object is pressed."
-    )
-    page.heading("How it was made")
-    surface = result.reconstruction.surface
-    page.paragraph(f"Shape: {surface.method}, {surface.reason}.")
-    page.table(["the loop of 1000 forces a second", "against a simulated hand"], _loop(servo))
-    if words := sent_words(servo):
-        page.paragraph(words)
-    page.table(
-        ["step", "time [s]"], [[_STAGES.get(name, name), f"{s:.1f}"] for name, s in result.seconds.items()]
-    )
-    page.result(as_json(result))
-    return page.write(path)
-
-
-def next_steps(result: DemoResult) -> list[str]:
-    """What to do after the demo."""
-    model = file_words(result.model.path, "MODEL")
-    return [f"feel it: `palpate touch {model}`", "bring in your own recording: `palpate open FILE`"]
-
-
-def _missed(servo: ServoReport) -> str:
-    missed = servo.missed_ticks
-    return f"; of {servo.ticks + missed} {missed} were skipped" if missed else ", and none was skipped"
 
 
 def _loop(servo: ServoReport) -> list[list[str]]:
@@ -166,7 +157,7 @@ def _meaning(result: DemoResult) -> str:
     noise = result.reconstruction.exploration.noise_n * np.sqrt(3.0)
     ratio = result.replay_rmse_n / noise
     compared = "as small as" if ratio < 1.1 else f"{ratio:.1f} times"
-    return f"That difference is {compared} the sensor's own noise ({1e3 * noise:.0f} mN)."
+    return f"That difference is {compared} the sensor's own noise ({mn(noise)})."
 
 
 def diagnosis_words(result: DemoResult) -> str:
@@ -176,11 +167,11 @@ def diagnosis_words(result: DemoResult) -> str:
     there = {known()} if law != "linear" else set()
     words = (
         "The simplest simulation, of small deformations and one stiffness, is "
-        f"{1e3 * found.gap_before_n:.0f} mN off at places that it was not fitted to"
+        f"{mn(found.gap_before_n)} off at places that it was not fitted to"
     )
     if found.effects:
-        words += f"; with {spoken(found.effects)} it is {1e3 * found.gap_after_n:.0f} mN off"
-    words += f". The sensor's noise is {1e3 * found.noise_n:.0f} mN."
+        words += f"; with {spoken(found.effects)} it is {mn(found.gap_after_n)} off"
+    words += f". The sensor's noise is {mn(found.noise_n)}."
     has = [name for name in found.effects if name in there]
     if has:
         words += f" The model that you feel has {spoken(has)} already: its {law} law stands for it."
@@ -209,28 +200,37 @@ def sent_words(servo: ServoReport) -> str:
 
 def _truth(result: DemoResult) -> str:
     truth = (result.recording.truth or {}).get("young_modulus_pa")
-    return f"; the truth is {truth / 1e3:.1f} kPa" if truth else ""
+    return f"; the truth is {kpa(truth, '.1f')}" if truth else ""
 
 
-def press_figures(result: DemoResult) -> dict[str, Figure]:
-    """Force along the normal over depth, measured and rendered, of presses spread over the peak force."""
+def spread_presses(result: DemoResult) -> list[int]:
+    """Presses spread over the peak force."""
+    shown = low_passed(result.model.presses)
+    push = _peaks(shown)
+    return [
+        int(i) for i in np.argsort(push)[np.linspace(0, len(push) - 1, SHOWN_PRESSES).round().astype(int)]
+    ]
+
+
+def _peaks(shown: Presses) -> list[float]:
+    return [shown.push[shown.rows([i])].max() for i in range(len(shown))]
+
+
+def press_figure(result: DemoResult, i: int) -> Figure:
+    """Force of a press along the normal over depth, measured and rendered."""
     presses = result.model.presses
     shown = low_passed(presses)
-    push = [shown.push[shown.rows([i])].max() for i in range(len(presses))]
-    chosen = np.argsort(push)[np.linspace(0, len(push) - 1, SHOWN_PRESSES).round().astype(int)]
     curves, smooth = presses.window(0.03, 0.03), shown.window(0.03, 0.03)
-    made = {}
-    for i in chosen:
-        made[f"press-{i + 1}"], ax = subplots(1, 1, figsize=(4.4, 3))
-        own = curves.rows([i])
-        depth, at = smooth.depth[own] * 1e3, np.searchsorted(result.recording.t, curves.t[own])
-        rendered = result.rendered_n[at] @ presses.normal[i]
-        ax.plot(depth, curves.push[own], ".", ms=1, color="#a8bccb", label="measured")
-        ax.plot(depth, rendered, lw=1.5, color="#c1121f", label="rendered")
-        ax.set(title=f"press {i + 1}", xlabel="depth [mm]", ylabel="force along the normal [N]")
-        ax.set_ylim(top=1.05 * max(push))
-        ax.legend(loc="upper left", frameon=False, markerscale=8)
-    return made
+    figure, ax = subplots(1, 1, figsize=(4.4, 3))
+    own = curves.rows([i])
+    depth, at = smooth.depth[own] * 1e3, np.searchsorted(result.recording.t, curves.t[own])
+    rendered = result.rendered_n[at] @ presses.normal[i]
+    ax.plot(depth, curves.push[own], ".", ms=1, color="#a8bccb", label="measured")
+    ax.plot(depth, rendered, lw=1.5, color="#c1121f", label="rendered")
+    ax.set(title=f"press {i + 1}", xlabel="depth [mm]", ylabel="force along the normal [N]")
+    ax.set_ylim(top=1.05 * max(_peaks(shown)))
+    ax.legend(loc="upper left", frameon=False, markerscale=8)
+    return figure
 
 
 def view(result: DemoResult) -> View:
@@ -280,12 +280,17 @@ def _simulated(result: DemoResult, t: np.ndarray) -> list[Line]:
     return lines if found.effects else lines[:1]
 
 
-def figures(result: DemoResult) -> dict[str, Figure]:
-    """The report's pictures by name."""
-    force, ax = subplots(1, 1, figsize=(9, 3))
+def force_figure(result: DemoResult) -> Figure:
+    """Force over time with the touches that were found."""
+    figure, ax = subplots(1, 1, figsize=(9, 3))
     force_over_time(ax, result.reconstruction.exploration)
-    thing, axes = subplots(1, 2, figsize=(10, 4.2))
+    return figure
+
+
+def object_figure(result: DemoResult) -> Figure:
+    """Where it was touched; how uncertain its shape is."""
+    figure, axes = subplots(1, 2, figsize=(10, 4.2))
     draw_touched(axes[0], result.model)
     doubt = felt_surface(result.model).uncertainty_m
     draw_object(axes[1], result.model, Colours(doubt * UNCERTAINTY.scale, UNCERTAINTY))
-    return {"force": force, "object": thing, **press_figures(result)}
+    return figure

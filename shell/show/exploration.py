@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.explore.suggestion import Explored, Step
-from palpate.show.page import Page, file_words, subplots
+from palpate.show import story as say
+from palpate.show.page import drawn, file_words
 from palpate.show.quantities import ORDER, UNCERTAINTY, softness
 from palpate.show.view3d import Colouring, Thing, View
+from palpate.words import mm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,26 +23,43 @@ _REACHED = {True: "yes", False: "not yet"}
 _NAMES = {"modulus": "Young's modulus", "surface": "surface", "cause": "one cause alone"}
 
 
-def lines(result: Explored) -> list[str]:
-    """What `print` says, with units."""
-    state = result.state
-    return [
-        f"{state.made} presses in {state.seconds:.0f} s: {state.words or 'nothing is known yet'}",
-        f"  {_ended(result)}",
-    ]
-
-
-def _ended(result: Explored) -> str:
-    return f"{'ended' if result.last.kind == 'stop' else 'not ended, next'}: {result.last.why}"
-
-
-def next_steps(result: Explored) -> list[str]:
-    """What to do with what was touched."""
-    recording = file_words(result.path, "REC")
-    steps = [f"make a model of it: `palpate reconstruct {recording} -o MODEL`"]
-    if result.last.kind != "stop":
-        steps.append(f"go on: the same command with `--continue {recording}`")
-    return steps
+def story(result: Explored) -> say.Story:
+    """What became known, where, and why it ended."""
+    name = Path(result.path).name.split(".")[0] or "an object"
+    yield say.Title(f"Exploration of {name}", suffixed=True)
+    state, recording = result.state, file_words(result.path, "REC")
+    how = f"{'ended' if result.last.kind == 'stop' else 'not ended, next'}: {result.last.why}"
+    yield say.Headline(
+        f"{state.made} presses in {state.seconds:.0f} s: {state.words or 'nothing is known yet'}"
+    )
+    yield say.Detail(how, on=say.TEXT)
+    soft = np.isfinite(state.modulus_pa)
+    soft_words = f"About as soft as {softness(state.modulus_pa)}. " if soft else ""
+    yield say.Sentence(f"{soft_words}The exploration {how}", on=say.PAGE)
+    if state.trouble:
+        yield say.Sentence(f"The last touch could not be used: {state.trouble}", on=say.PAGE)
+    go_on = f"go on: the same command with `--continue {recording}`"
+    yield say.Next([
+        f"make a model of it: `palpate reconstruct {recording} -o MODEL`",
+        *([go_on] if result.last.kind != "stop" else []),
+    ])  # fmt: skip
+    yield say.Rows(
+        ["goal", "now", "asked for", "reached"],
+        [[_NAMES[g.name], _goal(g.name, g.now), _goal(g.name, g.goal), _REACHED[g.met]] for g in state.goals],
+    )
+    yield say.Pictures([
+        say.Picture(lambda: drawn(draw, result, 5, 3.4), "How the modulus became known, press by press."),
+        say.Picture(lambda: drawn(_draw_surface, result, 5, 3.4), "How the surface became known."),
+    ])  # fmt: skip
+    if result.estimate.surface is not None:
+        flat = say.Picture(
+            lambda: drawn(_draw_places, result, 5, 4),
+            "The places touched from above, in order; the line is the outline there.",
+        )
+        yield say.Section("Where it was touched", [say.Turned(lambda: view(result), flat)])
+    yield say.Section("Every touch, and why there", [
+        say.Rows(["touch", "asked for because", "known after it"], _rows(result))
+    ])  # fmt: skip
 
 
 def _known(steps: tuple[Step, ...]) -> list[Step]:
@@ -121,46 +140,11 @@ def view(result: Explored) -> View | None:
     )
 
 
-def report(result: Explored, path: Path | str) -> Path:
-    """Write the page; returns its path."""
-    path = Path(path)
-    path = path if path.suffix else path.with_suffix(".html")
-    state = result.state
-    page = Page(f"Exploration of {Path(result.path).name.split('.')[0] or 'an object'}")
-    page.lead(f"{lines(result)[0]}.")
-    if np.isfinite(state.modulus_pa):
-        page.paragraph(f"About as soft as {softness(state.modulus_pa)}. The exploration {_ended(result)}.")
-    else:
-        page.paragraph(f"The exploration {_ended(result)}.")
-    if state.trouble:
-        page.paragraph(f"The last touch could not be used: {state.trouble}.")
-    page.next_steps(next_steps(result))
-    page.table(
-        ["goal", "now", "asked for", "reached"],
-        [[_NAMES[g.name], _goal(g.name, g.now), _goal(g.name, g.goal), _REACHED[g.met]] for g in state.goals],
-    )
-    pictures = [subplots(1, 1, figsize=(5, 3.4)) for _ in range(2)]
-    draw(result, pictures[0][1])
-    _draw_surface(result, pictures[1][1])
-    words = ("How the modulus became known, press by press.", "How the surface became known.")
-    page.figures([(figure, each) for (figure, _), each in zip(pictures, words, strict=True)])
-    turned = view(result)
-    if turned is not None:
-        page.heading("Where it was touched")
-        flat, ax = subplots(1, 1, figsize=(5, 4))
-        _draw_places(result, ax)
-        page.view(turned, flat, "The places touched from above, in order; the line is the outline there.")
-    page.heading("Every touch, and why there")
-    page.table(["touch", "asked for because", "known after it"], _rows(result))
-    page.result(result.as_json())
-    return page.write(path)
-
-
 def _goal(name: str, value: float) -> str:
     if not np.isfinite(value):
         return "unknown"
     if name == "surface":
-        return f"{1e3 * value:.2f} mm"
+        return f"{mm(value, '.2f')}"
     return f"{100 * value:.1f} %" if name == "modulus" else f"{100 * (1 - value):.1f} % sure"
 
 

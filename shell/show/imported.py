@@ -2,42 +2,43 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from palpate.importing.imported import Imported
 from palpate.show import recording as measured
+from palpate.show import story as say
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
 
-def lines(result: Imported) -> list[str]:
-    """What `print` says, line by line."""
+def story(result: Imported) -> say.Story:
+    """What the columns were taken for."""
     recording = result.understood.recording
     size = " x ".join(f"{v:.3g}" for v in 1e3 * np.ptp(recording.position, axis=0))
     greatest = float(np.linalg.norm(recording.force_on_tool, axis=1).max())
     how = "quasi-static points" if result.understood.quasi_static else f"{np.ptp(recording.t):.4g} s"
-    return [
-        f"{len(recording.t)} samples, {how}; path within {size} mm; force up to {greatest:.4g} N",
-        *(f"  {column}" for column in result.understood.columns.values()),
-        *(f"  {note}" for note in result.understood.notes),
-    ]
+    yield say.Headline(
+        f"{len(recording.t)} samples, {how}; path within {size} mm; force up to {greatest:.4g} N"
+    )
+    for said in (*result.understood.columns.values(), *result.understood.notes):
+        yield say.Detail(str(said))
 
 
-def as_json(result: Imported) -> dict[str, Any]:
-    """The figures of `palpate import --json`."""
-    recording = result.understood.recording
-    return {
-        "samples": len(recording.t),
-        "duration_s": float(np.ptp(recording.t)),
-        "sample_rate_hz": recording.sample_rate_hz,
-        "quasi_static": result.understood.quasi_static,
-        "columns": {role: str(c).partition(" = ")[2] for role, c in result.understood.columns.items()},
-        "notes": list(result.understood.notes),
-    }
+KEYS: tuple[say.Key, ...] = (
+    ("samples", lambda result: len(result.recording.t)),
+    ("duration_s", lambda result: np.ptp(result.recording.t)),
+    "sample_rate_hz=recording.sample_rate_hz",
+    "quasi_static=understood.quasi_static",
+    (
+        "columns",
+        lambda result: {role: str(c).partition(" = ")[2] for role, c in result.understood.columns.items()},
+    ),
+    "notes=understood.notes",
+)
 
 
 def draw(result: Imported, ax: Axes) -> None:

@@ -10,35 +10,55 @@ import numpy as np
 
 from palpate.diagnosis.specimen.result import FLOORS, Material
 from palpate.mechanics.quantities import fitting_unit, quantity_words, split_key
+from palpate.show import story as say
 from palpate.show.diagnosis.words import meaning as meaning_of
-from palpate.show.page import Page, subplots
+from palpate.show.page import drawn
 from palpate.show.quantities import readable, softness
+from palpate.words import counted, sentence, spaced, sure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def lines(result: Material) -> list[str]:
-    """What `print` says, with units."""
-    text = [f"{result.kind}: {result.curves} curve{'s' * (result.curves != 1)}; {_first(result)}"]
+def story(result: Material) -> say.Story:
+    """The answer, what it means, what to do; how far it is off, and what was found."""
+    more = f" and {len(result.files) - _NAMED} more" if len(result.files) > _NAMED else ""
+    yield say.Title(f"Material: {', '.join(Path(name).name for name in result.files[:_NAMED])}{more}")
+    yield say.Headline(f"{result.kind}: {counted(result.curves, 'curve')}; {_first(result)}", on=say.TEXT)
+    yield say.Headline(lead(result), on=say.PAGE)
     if np.isfinite(result.young_modulus_pa):
-        text.append(_modulus(result).replace(" of ", " ", 1))
-    ranked = sorted(result.error.items(), key=lambda item: item[1])
-    text.append(
-        f"error on what no fit has seen ({result.held_out}): "
-        + ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked)
+        yield say.TextLine(_modulus(result).replace(" of ", " ", 1))
+    yield say.Sentence(meaning(result), on=say.PAGE)
+    yield say.Next(next_steps(result))
+    first = f"{Path(result.files[0]).name} as it was measured, and {_by(result)} over it."
+    yield say.Picture(
+        lambda: drawn(draw, result, 8, 4), first if result.seen else "Error of the best of each kind."
     )
+    yield from (say.Sentence(f"{spaced(name)}: {meaning_of(name)}", on=say.PAGE) for name in result.effects)
+    ranked = sorted(result.error.items(), key=lambda item: item[1])
+    errors = ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked)
+    yield say.TextLine(f"error on what no fit has seen ({result.held_out}): {errors}")
     if result.closed is not None and result.closed_ci95 is not None:
-        closed, low, high = (min(share, 1.0) for share in (result.closed, *result.closed_ci95))
-        text.append(
-            f"what was found takes away {100 * closed:.0f} % of the gap (95 % sure: {100 * low:.0f} to "
-            f"{100 * high:.0f} %)"
-        )
-    text += [f"  {_called(name)}: {in_words(name, v)}" for name, v in result.parameters.items()]
-    text += [f"  {note}" for note in result.notes]
+        closed, low, high = (100 * min(share, 1.0) for share in (result.closed, *result.closed_ci95))
+        interval = sure(f"{low:.0f}", f"{high:.0f} %")
+        yield say.TextLine(f"what was found takes away {closed:.0f} % of the gap ({interval})")
+    yield say.Section("How far it is off", [
+        say.Sentence(
+            f"Each way was fitted to the rest and predicts what was left out ({result.held_out}). A spring "
+            "and damper is what one has without a theory of the material; a regression follows the curves "
+            "without any mechanics, so little is left to gain beyond it."
+        ),
+        say.Rows(["predicted by", "off by"], [[_way(n), f"{100 * e:.2g} %"] for n, e in ranked]),
+    ])  # fmt: skip
+    rows = [[_called(name), in_words(name, v)] for name, v in result.parameters.items()]
+    yield from (say.Detail(f"{what}: {value}", on=say.TEXT) for what, value in rows)
+    if rows:
+        yield say.Section("What was found", [say.Rows(["what", "value"], rows)])
+    yield from map(say.Note, result.notes)
     if result.unknown:
-        text.append(f"not told by such a test: {_unknown(result)}")
-    return text
+        unknown = ", ".join(map(spaced, result.unknown))
+        yield say.TextLine(f"not told by such a test: {unknown}")
+        yield say.Sentence(f"Such a test cannot tell: {unknown}", on=say.PAGE)
 
 
 def _first(result: Material) -> str:
@@ -65,9 +85,7 @@ def in_words(name: str, value: Any) -> str:
         each = [f"{quantity_words('g', g)} fades in {quantity_words('tau_s', tau)}" for g, tau in parts]
         return f"of the lasting force {', '.join(each)}"
     if isinstance(value, Mapping):
-        return ", ".join(
-            f"{split_key(key)[0].replace('_', ' ')} {in_words(key, v)}" for key, v in value.items()
-        )
+        return ", ".join(f"{spaced(split_key(key)[0])} {in_words(key, v)}" for key, v in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(in_words(name, v) for v in value) or "none"
     if isinstance(value, bool) or not isinstance(value, int | float):
@@ -81,54 +99,14 @@ def _fades(value: Mapping[str, Any]) -> bool:
     return isinstance(shares, list) and isinstance(times, list) and len(shares) == len(times) > 0
 
 
-def report(result: Material, path: Path | str) -> Path:
-    """Write one page; returns its path."""
-    more = f" and {len(result.files) - _NAMED} more" if len(result.files) > _NAMED else ""
-    page = Page(f"Material: {', '.join(Path(name).name for name in result.files[:_NAMED])}{more}")
-    tell(result, page)
-    page.result(as_json(result))
-    return page.write(path)
-
-
-def tell(result: Material, page: Page) -> None:
-    """The answer, what it means, what to do; then how far it is off, and what was found, into a page."""
-    page.lead(lead(result))
-    page.paragraph(meaning(result))
-    page.next_steps(next_steps(result))
-    figure, ax = subplots(1, 1, figsize=(8, 4))
-    draw(result, ax)
-    first = f"{Path(result.files[0]).name} as it was measured, and {_by(result)} over it."
-    page.figure(figure, first if result.seen else "Error of the best of each kind.")
-    for name in result.effects:
-        page.paragraph(
-            f"{name.replace('_', ' ')[:1].upper()}{name.replace('_', ' ')[1:]}: {meaning_of(name)}."
-        )
-    page.heading("How far it is off")
-    page.paragraph(
-        f"Each way was fitted to the rest and predicts what was left out ({result.held_out}). A spring and "
-        "damper is what one has without a theory of the material; a regression follows the curves without "
-        "any mechanics, so little is left to gain beyond it."
-    )
-    ranked = sorted(result.error.items(), key=lambda item: item[1])
-    page.table(["predicted by", "off by"], [[_way(n), f"{100 * e:.2g} %"] for n, e in ranked])
-    if result.parameters:
-        page.heading("What was found")
-        rows = [[_called(name), in_words(name, v)] for name, v in result.parameters.items()]
-        page.table(["what", "value"], rows)
-    for note in result.notes:
-        page.paragraph(f"{note[:1].upper()}{note[1:]}.")
-    if result.unknown:
-        page.paragraph(f"Such a test cannot tell: {_unknown(result)}.")
-
-
 def lead(result: Material) -> str:
     """The answer in a sentence, after what makes it worth less."""
     first = _first(result)
     if not np.isfinite(result.young_modulus_pa):
-        return f"{first[:1].upper()}{first[1:]}."
+        return sentence(first)
     said = f"The material has a {_modulus(result)}."
     if not result.predicts or result.at_bound or result.beaten_by:
-        return f"{first[:1].upper()}{first[1:]}. {said}"
+        return f"{sentence(first)} {said}"
     return f"{said[:-1]}; {first}."
 
 
@@ -137,8 +115,9 @@ def _modulus(result: Material) -> str:
     unit, factor = ("Pa", 1.0)
     if result.young_modulus_pa >= _KILO:
         unit, factor = fitting_unit("young_modulus_pa", result.young_modulus_pa)
-    sure = f" (95 % sure: {factor * low:.3g} to {factor * high:.3g} {unit})" if np.isfinite(low) else ""
-    return f"Young's modulus of {factor * result.young_modulus_pa:.3g} {unit}{sure}"
+    ends = sure(f"{factor * low:.3g}", f"{factor * high:.3g} {unit}")
+    interval = f" ({ends})" if np.isfinite(low) else ""
+    return f"Young's modulus of {factor * result.young_modulus_pa:.3g} {unit}{interval}"
 
 
 def meaning(result: Material) -> str:
@@ -189,10 +168,6 @@ def _way(name: str) -> str:
     return _WAYS.get(name, name)
 
 
-def _unknown(result: Material) -> str:
-    return ", ".join(each.replace("_", " ") for each in result.unknown)
-
-
 def _by(result: Material) -> str:
     """What the curve over the measured one is."""
     return "what was found" if result.effects and result.kind == "indentation" else _way(result.law)
@@ -200,34 +175,34 @@ def _by(result: Material) -> str:
 
 def _called(name: str) -> str:
     """A parameter's name in words, without its unit."""
-    return "first touch after" if name == "onset_m" else split_key(name)[0].replace("_", " ")
+    return "first touch after" if name == "onset_m" else spaced(split_key(name)[0])
 
 
-def as_json(result: Material) -> dict[str, Any]:
-    """The figures of `palpate material --json`."""
-    finite = np.isfinite(result.young_modulus_pa)
-    return {
-        "kind": result.kind,
-        "files": list(result.files),
-        "curves": result.curves,
-        "held_out": result.held_out,
-        "young_modulus_pa": result.young_modulus_pa if finite else None,
-        "young_modulus_ci95_pa": (
-            list(result.young_modulus_ci95_pa) if np.isfinite(result.young_modulus_ci95_pa).all() else None
-        ),
-        "law": result.law,
-        "relative_error": result.error,
-        "verdict": result.verdict,
-        "effects": list(result.effects),
-        "gap_closed": result.closed,
-        "gap_closed_ci95": None if result.closed_ci95 is None else list(result.closed_ci95),
-        "parameters": result.parameters,
-        "notes": list(result.notes),
-        "unknown": list(result.unknown),
-        "predicts": result.predicts,
-        "at_bound": list(result.at_bound),
-        "bound_carries_modulus": result.bound_carries,
-    }
+def _finite(values: Any) -> Any:
+    """What is known; None where an end of it is not."""
+    return values if np.isfinite(values).all() else None
+
+
+KEYS: tuple[say.Key, ...] = (
+    "kind",
+    "files",
+    "curves",
+    "held_out",
+    "young_modulus_pa",
+    ("young_modulus_ci95_pa", lambda result: _finite(result.young_modulus_ci95_pa)),
+    "law",
+    "relative_error=error",
+    "verdict",
+    "effects",
+    "gap_closed=closed",
+    "gap_closed_ci95=closed_ci95",
+    "parameters",
+    "notes",
+    "unknown",
+    "predicts",
+    "at_bound",
+    "bound_carries_modulus=bound_carries",
+)
 
 
 def draw(result: Material, ax: Axes) -> None:

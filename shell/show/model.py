@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from palpate.mechanics.model.files import write_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.render.surface.felt_surface import felt_surface
-from palpate.show.page import Page, file_words, subplots
+from palpate.show import story as say
+from palpate.show.page import drawn, file_words
 from palpate.show.quantities import (
     DEPTH,
     KELVIN_VOIGT,
@@ -24,10 +25,10 @@ from palpate.show.quantities import (
     STIFFNESS,
     UNCERTAINTY,
     softness,
-    with_unit,
 )
 from palpate.show.scenery import AZIMUTH_DEG, add_dots, add_object, draw_touched, level_axes
 from palpate.show.view3d import Colouring, Line, Thing, Traces, View
+from palpate.words import kpa, mm, sure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,32 +93,42 @@ def facing(up: np.ndarray, out: np.ndarray) -> float:
     return float(np.degrees(np.arctan2(across[1], across[0]))) - 20.0
 
 
-def lines(result: Model) -> list[str]:
-    """What `print` says, with units."""
+def story(result: Model) -> say.Story:
+    """The model's size, and the object to be turned."""
     mesh, nu = result.mesh, result.material.poisson_ratio
     height = float(result.support.height(mesh.points).max())
-    return [
-        f"Model of {result.name}: {modulus_words(result)}, Poisson's ratio {nu:g}",
-        f"  {with_unit(height, 'mm', 1e3, 3)} high; "
-        f"tip radius {with_unit(result.tool.tip_radius_m, 'mm', 1e3)}; {presses_words(result)}; "
-        f"effects: {', '.join(result.effects) or 'none'}",
-        f"  mesh: {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra of order {mesh.order}, "
-        f"edges of {with_unit(result.mesh_size_m, 'mm', 1e3)}",
-        f"  folder: {result.path or 'not written; .save(MODEL) writes it'}",
-    ]
+    yield say.Headline(f"Model of {result.name}: {modulus_words(result)}, Poisson's ratio {nu:g}")
+    yield say.Sentence(f"About as soft as {softness(result.material.young_modulus_pa)}", on=say.PAGE)
+    where = file_words(result.path, "MODEL")
+    yield say.Next([
+        f"feel it: `palpate touch {where}`",
+        f"let others press it: `palpate export {where} --to page -o touch.html`",
+    ])  # fmt: skip
+    yield say.Turned(
+        lambda: view(result),
+        say.Picture(lambda: drawn(draw, result, 8, 4), "The object, and the places touched."),
+        result,
+    )
+    yield say.Detail(
+        f"{mm(height)} high; tip radius {mm(result.tool.tip_radius_m, '.4g')}; {presses_words(result)}; "
+        f"effects: {', '.join(result.effects) or 'none'}"
+    )
+    yield say.Detail(
+        f"mesh: {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra of order {mesh.order}, "
+        f"edges of {mm(result.mesh_size_m, '.4g')}"
+    )
+    yield say.Detail(f"folder: {result.path or 'not written; .save(MODEL) writes it'}")
 
 
-def as_json(result: Model) -> dict[str, Any]:
-    """The figures of `palpate model --json`, keys with units."""
-    return {
-        "model": None if result.path is None else str(result.path),
-        "young_modulus_pa": result.material.young_modulus_pa,
-        "volume_m3": float(result.mesh.volumes.sum()),
-        "nodes": len(result.mesh.points),
-        "tetrahedra": len(result.mesh.tetrahedra),
-        "support_point_m": result.support.point,
-        "support_normal": result.support.normal,
-    }
+KEYS: tuple[say.Key, ...] = (
+    "model=path",
+    "young_modulus_pa=material.young_modulus_pa",
+    ("volume_m3", lambda result: result.mesh.volumes.sum()),
+    ("nodes", lambda result: len(result.mesh.points)),
+    ("tetrahedra", lambda result: len(result.mesh.tetrahedra)),
+    "support_point_m=support.point",
+    "support_normal=support.normal",
+)
 
 
 def draw(result: Model, ax: Axes) -> None:
@@ -149,28 +160,6 @@ def place(result: Model, plotter: Plotter) -> None:
             break
 
 
-def next_steps(result: Model) -> list[str]:
-    """What to do with a model."""
-    where = file_words(result.path, "MODEL")
-    return [
-        f"feel it: `palpate touch {where}`",
-        f"let others press it: `palpate export {where} --to page -o touch.html`",
-    ]
-
-
-def tell(result: Model, page: Page) -> None:
-    """The model's size, and the object to be turned, into a page."""
-    first, *rest = lines(result)
-    page.lead(f"{first}.")
-    page.paragraph(f"About as soft as {softness(result.material.young_modulus_pa)}.")
-    page.next_steps(next_steps(result))
-    figure, ax = subplots(1, 1, figsize=(8, 4))
-    draw(result, ax)
-    page.view(view(result), figure, "The object, and the places touched.", result)
-    for line in rest:
-        page.paragraph(line.strip())
-
-
 def presses_words(model: Model) -> str:
     """How many presses it holds, and whether anybody made them: '32 virtual presses'."""
     return f"{len(model.presses)} {'virtual ' if model.untouched else ''}presses"
@@ -178,9 +167,9 @@ def presses_words(model: Model) -> str:
 
 def modulus_words(model: Model) -> str:
     """The Young's modulus with its 95 % interval, kPa."""
-    low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
-    interval = f" (95 % sure: {low:.1f} to {high:.1f})" if np.isfinite([low, high]).all() else ""
-    return f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa{interval}"
+    ends = model.material.young_modulus_ci95_pa
+    interval = f" ({sure(*(f'{end / 1e3:.1f}' for end in ends))})" if np.isfinite(ends).all() else ""
+    return f"Young's modulus {kpa(model.material.young_modulus_pa)}{interval}"
 
 
 def save(model: Model, path: Path | str) -> Model:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,12 +14,14 @@ from palpate.diagnosis.other_simulator.result import PARTS, SimulatedGap
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.registry import effect
+from palpate.show import story as say
 from palpate.show.diagnosis import place as place_gap
 from palpate.show.diagnosis.figures import curve_pictures, first_picture, press_pictures
 from palpate.show.diagnosis.figures import view as view_of_gap
 from palpate.show.diagnosis.parameters import number, plain_key, short
-from palpate.show.diagnosis.words import AXIS_WORDS, chance_words, force_words, percent, share_words, spoken
-from palpate.show.page import Page, new_figure
+from palpate.show.diagnosis.story import goes_with
+from palpate.show.page import drawn
+from palpate.words import begun, force_words, percent, sentence, share_words, spaced, spoken
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -155,37 +156,88 @@ def verdict(result: SimulatedGap) -> str:
     return f"{most}; named: {spoken(result.effects) or 'nothing'}{rivals}"
 
 
-def lines(result: SimulatedGap) -> list[str]:
-    """What `print` says: the answer, its three parts, what to mend, then what the simulator was given."""
-    after = f"{force_words(result.gap_after_n)} once all of it is mended, at places that were not fitted"
-    text = [
-        f"verdict: {verdict(result)}",
-        f"gap: simulated and measured force differ by {force_words(result.gap_before_n)} (the sensor's "
-        f"noise: {force_words(result.noise_n)}); {after}",
-        "  its parts, and their shares of its mean square:",
-    ]
-    for name in PARTS:
-        part = result.parts[name]
-        said = f"  {name}, {MEANING[name]}: {force_words(part.gap_n)}, {percent(part.share)}"
-        text.append(
-            ": ".join([said, *(["; ".join(_named(result, part.names, _spaced))] if part.names else [])])
-        )
-    text.append(
-        f"  unexplained: {force_words(result.unexplained_n)}, {percent(result.unexplained)} (the sensor's "
-        f"noise {percent(result.noise_share)}, first touches {percent(result.touch_share)})"
+def story(result: SimulatedGap) -> say.Story:
+    """The answer, its three parts, what to mend, what the simulator was given; the evidence."""
+    yield say.Title(
+        f"{result.simulator.name} against measured touch: {getattr(result.reality.recording, 'name', '')}"
     )
+    yield say.Headline(f"verdict: {verdict(result)}", on=say.TEXT)
+    yield say.Headline(lead(result), on=say.PAGE)
+    yield say.Next(result.advice, on=say.PAGE)
+    yield from _parts(result)
     if result.mended is not None:
-        text.append(f"run again with {result.mended.settings}: {mended_words(result)}")
-    text += [f"advice: {each}" for each in result.advice]
-    given, about = result.simulator.stated, result.simulator
-    said = ", ".join(
-        f"{words} {shown} {unit}".rstrip() + ("" if key in given.given else " (not stated: the model's)")
+        again = f"run again with {result.mended.settings}: {mended_words(result)}"
+        yield say.Sentence(again)
+    yield from (say.TextLine(f"advice: {each}") for each in result.advice)
+    about = result.simulator
+    given = ", ".join(
+        f"{words} {shown} {unit}".rstrip()
+        + ("" if key in about.stated.given else " (not stated: the model's)")
         for key, words, shown, unit in _given(result)
     )
-    text.append(f"given to {about.name}{' ' + about.version if about.version else ''}: {said}")
-    text += [f"  note: {note}" for note in result.notes]
-    text += [f"  {reason}" for reason in result.reasons]
-    return [line.replace("\u00a0", " ") for line in text]
+    version = f" {about.version}" if about.version else ""
+    yield say.TextLine(f"given to {about.name}{version}: {given}")
+    yield from (say.Note(f"note: {note}") for note in result.notes)
+    yield from (say.Note(reason, on=say.TEXT) for reason in result.reasons)
+    shares = (result.unexplained, *(part.share for part in result.parts.values()))
+    if sum(share > SHOWN for share in shares) > 1:
+        yield say.Picture(
+            lambda: drawn(draw, result, 9, 1.7),
+            "Taken off one after another, at places that no fit has seen: numerics, parameters, then what "
+            f"every ideal simulation lacks. Of what is left {percent(result.noise_share)} is the sensor's "
+            f"noise and {percent(result.touch_share)} where exactly the object was first met.",
+        )
+    yield say.Section("", _seen(result))
+    yield say.Section("What the simulator was given", _stated(result))
+    yield say.Section("What was tried", _tried(result))
+    yield say.Section("What the difference depends on", _depends(result))
+
+
+def _parts(result: SimulatedGap) -> say.Story:
+    """How far it is off, and what of that is numerics, parameters, reality."""
+    after = f"{force_words(result.gap_after_n)} once all of it is mended, at places that were not fitted"
+    yield say.TextLine(
+        f"gap: simulated and measured force differ by {force_words(result.gap_before_n)} (the sensor's "
+        f"noise: {force_words(result.noise_n)}); {after}"
+    )
+    yield say.Detail("its parts, and their shares of its mean square:", on=say.TEXT)
+    cards = []
+    for name in PARTS:
+        part = result.parts[name]
+        size = f"{force_words(part.gap_n)}, {percent(part.share)}"
+        short_names = "; ".join(_named(result, part.names, spaced))
+        yield say.Detail(f"{name}, {MEANING[name]}: {size}{short_names and f': {short_names}'}", on=say.TEXT)
+        meant = "; ".join(_named(result, part.names)) or "nothing is named here"
+        cards.append((f"{begun(name)}: {MEANING[name]}", size, sentence(meant)))
+    yield say.Detail(
+        f"unexplained: {force_words(result.unexplained_n)}, {percent(result.unexplained)} (the sensor's "
+        f"noise {percent(result.noise_share)}, first touches {percent(result.touch_share)})",
+        on=say.TEXT,
+    )
+    yield say.Cards(cards)
+
+
+def _seen(result: SimulatedGap) -> say.Story:
+    """The object by the gap."""
+    shown, model = as_diagnosis(result), result.reality.model
+    assert model is not None
+    yield say.Turned(
+        lambda: view_of_gap(shown),
+        say.Picture(
+            lambda: first_picture(model, shown),
+            "Left: how far this simulator is from the measured force around each place. Right: one press, "
+            "measured, simulated, and (dashed) with all that is named mended.",
+        ),
+        model,
+    )
+
+
+def _depends(result: SimulatedGap) -> say.Story:
+    shown = as_diagnosis(result)
+    yield goes_with(result, "the difference depends on")
+    yield say.Pictures(curve_pictures(shown))
+    yield say.Pictures(press_pictures(shown))
+    yield from map(say.Note, result.reasons)
 
 
 def mended_words(result: SimulatedGap) -> str:
@@ -197,10 +249,6 @@ def mended_words(result: SimulatedGap) -> str:
         f"({force_words(result.without_numerics_n)} was said once its numerics are mended); still named: "
         f"{spoken(result.mended.effects) or 'nothing'}"
     )
-
-
-def _spaced(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _named(result: SimulatedGap, names: Sequence[str], words: Callable[[str], str] = meaning) -> list[str]:
@@ -254,70 +302,7 @@ def _open(result: SimulatedGap) -> float:
     return result.unexplained - result.noise_share - result.touch_share
 
 
-def _cards(result: SimulatedGap) -> list[tuple[str, str, str]]:
-    cards = []
-    for name in PARTS:
-        part = result.parts[name]
-        text = "; ".join(_named(result, part.names)) or "nothing is named here"
-        cards.append(
-            (
-                f"{name.capitalize()}: {MEANING[name]}",
-                f"{force_words(part.gap_n)}, {percent(part.share)}",
-                text[0].upper() + text[1:] + ".",
-            )
-        )
-    return cards
-
-
-def report(result: SimulatedGap, path: Path | str) -> Path:
-    """Write one self-contained HTML page; returns its path."""
-
-    shown = as_diagnosis(result)
-    assert result.reality.model is not None and result.reality.recording is not None
-    page = Page(f"{result.simulator.name} against measured touch: {result.reality.recording.name}")
-    page.lead(lead(result))
-    page.next_steps(result.advice)
-    page.cards(_cards(result))
-    if result.mended is not None:
-        page.paragraph(f"Run again with {result.mended.settings}: {mended_words(result)}.")
-    for note in result.notes:
-        page.paragraph(f"Note: {note}.")
-    if sum(share > SHOWN for share in (result.unexplained, *(p.share for p in result.parts.values()))) > 1:
-        figure = new_figure(9, 1.7, layout="constrained")
-        draw(result, figure.subplots())
-        page.figure(
-            figure,
-            "Taken off one after another, at places that no fit has seen: numerics, parameters, then what "
-            f"every ideal simulation lacks. Of what is left {percent(result.noise_share)} is the sensor's "
-            f"noise and {percent(result.touch_share)} where exactly the object was first met.",
-        )
-    page.view(
-        view_of_gap(shown),
-        first_picture(result.reality.model, shown),
-        "Left: how far this simulator is from the measured force around each place. Right: one press, "
-        "measured, simulated, and (dashed) with all that is named mended.",
-        result.reality.model,
-    )
-    _stated(page, result)
-    _tried(page, result)
-    page.heading("What the difference depends on")
-    page.table(
-        ["the difference depends on", "share of it", "how often chance does this"],
-        [
-            [AXIS_WORDS[a.axis], percent(a.share), chance_words(a.p)]
-            for a in sorted(result.where.axes, key=lambda a: -a.share)
-        ],
-    )
-    page.figures(curve_pictures(shown))
-    page.figures(press_pictures(shown))
-    for reason in result.reasons:
-        page.paragraph(reason[0].upper() + reason[1:] + ".")
-    page.result(result.as_json())
-    return page.write(path)
-
-
-def _stated(page: Page, result: SimulatedGap) -> None:
-    page.heading("What the simulator was given")
+def _stated(result: SimulatedGap) -> say.Story:
     given = result.simulator.stated
     wrong = {e.name: e for e in result.entries if e.domain == "parameters"}
     field = {
@@ -337,23 +322,22 @@ def _stated(page: Page, result: SimulatedGap) -> None:
         said = "stated" if key in given.given else "not stated: the model's"
         own = "agrees" if key in given.given else "-"
         rows.append([words, shown[0], said, shown[1] or own, unit])
-    page.table(["parameter", "given", "by whom", "the recording says", "unit"], rows)
+    yield say.Rows(["parameter", "given", "by whom", "the recording says", "unit"], rows)
 
 
-def _tried(page: Page, result: SimulatedGap) -> None:
-    page.heading("What was tried")
-    page.paragraph(
+def _tried(result: SimulatedGap) -> say.Story:
+    yield say.Sentence(
         "Each flaw of a simulator was held against the difference between its force and our own law's at the "
         "parameters that it was given, where no sensor's noise stands in the way, and judged at places that "
         "the fit had not seen. The difference left is that to the measured force once this alone is mended: "
         "of two flaws that hide one another it can be more than before. A flaw that takes much away and is "
         "unlikely is a worse account of the same than those that are named."
     )
-    page.table(
+    yield say.Rows(
         ["effect", "kind", "what it means", "how likely", "difference left [mN]", "taken away", "values"],
         [
             [
-                e.name.replace("_", " "),
+                spaced(e.name),
                 e.domain,
                 meaning(e.name),
                 percent(e.probability),

@@ -10,7 +10,7 @@ import io
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.resources import files
@@ -21,8 +21,27 @@ from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.disk.writing import PNG, Kind, atomic_file
 from palpate.output import plain
 from palpate.show.glossary import Terms
+from palpate.show.story import (
+    TEXT,
+    Cards,
+    Detail,
+    Headline,
+    Markup,
+    Next,
+    Note,
+    Picture,
+    Pictures,
+    Rows,
+    Section,
+    Sentence,
+    Story,
+    Title,
+    Turned,
+)
+from palpate.words import ended, sentence
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from palpate.mechanics.model.model import Model
@@ -41,15 +60,48 @@ _MOST_SVG, _MOST_PARTS = 400_000, 3000
 
 
 class Page:
-    """Collects parts in order; `write` renders them whole."""
+    """Collects parts in order; `write` renders them whole. folder: where named pictures are written too."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, folder: Path | None = None) -> None:
         self.title = title
+        self._folder = folder
         self._parts: list[str] = [f"<h1>{html.escape(title)}</h1>"]
         self._live = False
         self._terms = Terms()
         self._result = ""
         self._drawn: list[tuple[Any, bytes, str]] = []
+
+    def tell(self, story: Story) -> None:
+        """Print a result's story, without what is for a terminal alone."""
+        for block in story:
+            if block.on == TEXT:
+                continue
+            match block:
+                case Headline(text=text):
+                    self.lead(ended(text))
+                case Sentence(text=text) | Note(text=text):
+                    self.paragraph(sentence(text))
+                case Detail(text=text):
+                    self.paragraph(text)
+                case Next(steps=steps):
+                    self.next_steps(list(steps))
+                case Cards(cards=cards):
+                    self.cards(list(cards))
+                case Rows(header=header, rows=rows):
+                    self.table(header, list(rows))
+                case Picture(caption=caption):
+                    self.figure(self._picture(block), caption)
+                case Pictures(pictures=pictures):
+                    self.figures([(self._picture(each), each.caption) for each in pictures])
+                case Turned(still=still, model=model):
+                    if (view := block.view()) is not None:
+                        self.view(view, self._picture(still), still.caption, model)
+                case Markup(html=text):
+                    self.part(text)
+                case Section(heading=heading, blocks=blocks):
+                    if heading:
+                        self.heading(heading)
+                    self.tell(blocks)
 
     def heading(self, text: str) -> None:
         """A section's heading."""
@@ -138,16 +190,6 @@ class Page:
             + f"</footer>{self._scripts()}</body></html>"
         )
 
-    def save(self, folder: Path | str, figures: Mapping[str, Any]) -> dict[str, Path]:
-        """Write each picture as `folder/NAME.png`, drawn once for the page as well; returns the paths."""
-        paths = {}
-        for name, picture in figures.items():
-            data, _ = self._once(picture)
-            paths[name] = Path(folder) / f"{name}.png"
-            with atomic_file(paths[name], PNG) as temporary:
-                temporary.write_bytes(data)
-        return paths
-
     def write(self, path: Path | str) -> Path:
         """Write the page whole; returns its path."""
         with atomic_file(path, PAGE) as temporary:
@@ -164,6 +206,14 @@ class Page:
 
     def _words(self, text: str) -> str:
         return self._terms.linked(_words(text))
+
+    def _picture(self, each: Picture) -> Any:
+        """A picture, drawn; as a file too, drawn once for both, where it has a name and there is a folder."""
+        picture = each.draw()
+        if each.name and self._folder is not None:
+            with atomic_file(self._folder / f"{each.name}.png", PNG) as temporary:
+                temporary.write_bytes(self._once(picture)[0])
+        return picture
 
     def _once(self, picture: Any) -> tuple[bytes, str]:
         """A picture's PNG and its packed drawing, made once."""
@@ -183,6 +233,18 @@ class Page:
         words = f"<figcaption>{self._terms.linked(said)}</figcaption>"
         wide = ' class="wide"' if _LEGIBLE * _width(data) > _PHONE_PX else ""
         return f"<figure{wide}>{scrolling(drawn)}{words}{packed}</figure>"
+
+
+def page_of(title: Title, story: Story, figures: Mapping[str, Any], path: Path | str) -> Path:
+    """Write what follows a story's title as one page; figures: of its JSON. Returns its path."""
+    path = Path(path)
+    if title.suffixed and not path.suffix:
+        path = path.with_suffix(".html")
+    folders = {"own": path.with_suffix(""), "beside": path.parent}
+    page = Page(title.text, folders.get(title.pictures))
+    page.tell(story)
+    page.result(figures)
+    return page.write(path)
 
 
 def scrolling(wide: str) -> str:
@@ -279,6 +341,19 @@ def subplots(
     """A figure and its axes; figsize: inches; more: what `Figure.subplots` takes."""
     figure = new_figure(*figsize, layout=layout)
     return figure, figure.subplots(rows, columns, **more)
+
+
+def drawn(
+    draw: Callable[[Any, Axes], object],
+    result: Any,
+    width_in: float,
+    height_in: float,
+    layout: Any = "constrained",
+) -> Figure:
+    """A figure of one plot of a result."""
+    figure = new_figure(width_in, height_in, layout=layout)
+    draw(result, figure.subplots())
+    return figure
 
 
 def png_bytes(picture: Any) -> bytes:

@@ -76,8 +76,3 @@ def readable(label: str, values: Sequence[float]) -> tuple[str, list[float]]:
     most = max((abs(v) for v in values if abs(v) > _NOTHING), default=1.0)
     unit, scale = prefixed(found[2], most)
     return f"{found[1]}[{unit}]", [0.0 if abs(v) <= _NOTHING else scale * v for v in values]
-
-
-def with_unit(value: float, unit: str, scale: float = 1.0, digits: int = 4) -> str:
-    """A number with its unit for people: `with_unit(0.0123, "mm", 1e3)` is '12.3 mm'."""
-    return f"{value * scale:.{digits}g} {unit}"

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.mechanics.recording.recording import Recording
-from palpate.show.quantities import with_unit
+from palpate.show.story import Detail, Headline, Story
+from palpate.words import mm, mn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,19 +18,21 @@ FORCE_COLOUR, TOUCH_COLOUR, PEAK_COLOUR, PHASE_COLOUR = "#457b9d", "#1d3557", "#
 """Of every picture over time: the force, first touches, peaks (and what is grave), phase I."""
 
 
-def lines(result: Recording) -> list[str]:
-    """What `print` says, with units."""
+def story(result: Recording) -> Story:
+    """Its size, and where its base was traced."""
     phase, noise = result.boundary_phase, result.force_noise_std_n
     size = np.ptp(result.position, axis=0) * 1e3
-    return [
+    yield Headline(
         f"Recording {result.name}: {result.object_name}, {result.duration_s:.1f} s, "
-        f"{len(result.t)} samples at {result.sample_rate_hz:g} Hz",
-        f"  tip radius {with_unit(result.tip_radius_m, 'mm', 1e3)}; path within {size[0]:.0f} x "
-        f"{size[1]:.0f} x {size[2]:.0f} mm; force up to {with_unit(result.force_n.max(), 'N')}"
-        + ("" if noise is None else f"; sensor noise {with_unit(noise, 'mN', 1e3)} an axis"),
-        "  phase I (the base is traced): "
-        + ("not stated, found by reconstruction" if phase is None else f"{phase[0]:g} to {phase[1]:g} s"),
-    ]
+        f"{len(result.t)} samples at {result.sample_rate_hz:g} Hz"
+    )
+    yield Detail(
+        f"tip radius {mm(result.tip_radius_m, '.4g')}; path within {size[0]:.0f} x {size[1]:.0f} x "
+        f"{size[2]:.0f} mm; force up to {result.force_n.max():.4g} N"
+        + ("" if noise is None else f"; sensor noise {mn(noise, '.4g')} an axis")
+    )
+    traced = "not stated, found by reconstruction" if phase is None else f"{phase[0]:g} to {phase[1]:g} s"
+    yield Detail(f"phase I (the base is traced): {traced}")
 
 
 def draw(result: Recording, ax: Axes) -> None:

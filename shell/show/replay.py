@@ -8,8 +8,11 @@ import numpy as np
 
 from palpate.render.force_error import said
 from palpate.render.replay import ReplayResult
+from palpate.show import story as say
+from palpate.show.curve import solved_rows
 from palpate.show.page import file_words
 from palpate.show.quantities import ERROR
+from palpate.words import mn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,54 +23,50 @@ if TYPE_CHECKING:
 MEASURED, RENDERED = "#a8bccb", "#c1121f"
 
 
-def lines(result: ReplayResult) -> list[str]:
-    """What `print` says, with units."""
-    return [
-        f"{result.renderer}: rendered and measured force differ by {1e3 * result.rmse_n:.3g} mN, "
-        f"{100 * result.relative:.3g} % of the measured {result.force_rms_n:.3g} N"
-        + (f" (the sensor's noise: {1e3 * result.noise_n:.3g} mN)" if result.noise_n is not None else ""),
-        f"  root mean square over {int(result.contact.sum())} samples in contact",
-        *([f"  {words}"] if (words := said(result.error_figures)) else []),
-        *(_solved(result.exact) if result.exact is not None else []),
-    ]
-
-
-def _solved(exact: ExactReplay) -> list[str]:
-    """Law, solution and bound at the deepest of each place."""
-    found = [
-        f"  solved at {len(exact.places)} places, and the forces are by it",
-        "    at the deepest [mm]   law [N]   solved [N]   the law may be off by [N]",
-    ]
-    for one in exact.places:
-        depth, law, by, bound = 1e3 * one.depth_m[-1], one.law_n[-1], one.solved_n[-1], one.error_n[-1]
-        found.append(f"    {depth:19.2f}{law:10.3f}{by:13.3f}{bound:12.3f}")
-    if exact.unsolved:
-        found.append(f"  {exact.unsolved} places keep the law: no equilibrium was found there")
-    return found
-
-
-def next_steps(result: ReplayResult) -> list[str]:
-    """What to do with the difference."""
-    recording, model = file_words(result.recording.path, "REC"), file_words(result.model.path, "MODEL")
-    return [f"see what makes it: `palpate diagnose {recording} --model {model} --report PAGE.html`"]
-
-
-def as_json(result: ReplayResult) -> dict[str, Any]:
-    """The figures of `palpate replay --json`, keys with units."""
-    figures = {
-        "renderer": result.renderer,
-        "samples": len(result.force_n),
-        "contact_samples": int(result.contact.sum()),
-        "rmse_n": result.rmse_n,
-        "force_rms_n": result.force_rms_n,
-        "relative_rmse": result.relative,
-        "peak_force_n": float(np.linalg.norm(result.force_n, axis=1).max()),
-        **result.error_figures,
-    }
+def story(result: ReplayResult) -> say.Story:
+    """How far rendered and measured force are apart."""
+    noise = "" if result.noise_n is None else f" (the sensor's noise: {mn(result.noise_n, '.3g')})"
+    yield say.Headline(
+        f"{result.renderer}: rendered and measured force differ by {mn(result.rmse_n, '.3g')}, "
+        f"{100 * result.relative:.3g} % of the measured {result.force_rms_n:.3g} N{noise}"
+    )
+    yield say.Detail(f"root mean square over {int(result.contact.sum())} samples in contact")
+    if words := said(result.error_figures):
+        yield say.Detail(words)
     if result.exact is not None:
-        figures["exact"] = {"unsolved_places": result.exact.unsolved,
-                            "places": [one.as_json() for one in result.exact.places]}  # fmt: skip
-    return figures if result.noise_n is None else {**figures, "noise_n": result.noise_n}
+        yield from _solved(result.exact)
+    recording, model = file_words(result.recording.path, "REC"), file_words(result.model.path, "MODEL")
+    yield say.Next([f"see what makes it: `palpate diagnose {recording} --model {model} --report PAGE.html`"])
+
+
+def _solved(exact: ExactReplay) -> say.Story:
+    """Law, solution and bound at the deepest of each place."""
+    yield say.Detail(f"solved at {len(exact.places)} places, and the forces are by it")
+    yield solved_rows(
+        "at the deepest [mm]",
+        [(1e3 * p.depth_m[-1], p.law_n[-1], p.solved_n[-1], p.error_n[-1]) for p in exact.places],
+    )
+    if exact.unsolved:
+        yield say.Detail(f"{exact.unsolved} places keep the law: no equilibrium was found there")
+
+
+def _exact(result: ReplayResult) -> dict[str, Any]:
+    found = result.exact
+    return {} if found is None else {"exact": {"unsolved_places": found.unsolved, "places": found.places}}
+
+
+KEYS: tuple[say.Key, ...] = (
+    "renderer",
+    ("samples", lambda result: len(result.force_n)),
+    ("contact_samples", lambda result: result.contact.sum()),
+    "rmse_n",
+    "force_rms_n",
+    "relative_rmse=relative",
+    ("peak_force_n", lambda result: np.linalg.norm(result.force_n, axis=1).max()),
+    lambda result: result.error_figures,
+    _exact,
+    lambda result: {} if result.noise_n is None else {"noise_n": result.noise_n},
+)
 
 
 def draw(result: ReplayResult, ax: Axes) -> None:
@@ -81,7 +80,7 @@ def draw(result: ReplayResult, ax: Axes) -> None:
         ylabel="force magnitude [N]",
         xlim=(result.t[counted][0], result.t[counted][-1]),
         ylim=(0, 1.05 * most),
-        title=f"typically {1e3 * result.rmse_n:.0f} mN apart, {100 * result.relative:.1f} %",
+        title=f"typically {mn(result.rmse_n)} apart, {100 * result.relative:.1f} %",
     )
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=2)
 

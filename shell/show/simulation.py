@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +10,11 @@ from palpate.mechanics.frames import tangents
 from palpate.scenes.laboratory.paths import SIDEWAYS
 from palpate.scenes.laboratory.simulate import Simulation
 from palpate.show import recording as measured
-from palpate.show.page import Page, file_words, new_figure
+from palpate.show import story as say
+from palpate.show.page import file_words, new_figure
 from palpate.show.quantities import DEPTH, ERROR, ORDER
 from palpate.show.view3d import Colouring, Line, Thing, Traces, View
+from palpate.words import kpa, listed, mn, spaced
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,33 +27,64 @@ PRESSES_SHOWN = 7
 """Presses whose curves are drawn: more would hide one another."""
 
 
-def lines(result: Simulation) -> list[str]:
-    """What `print` says, with units."""
-    recording = result.recording
-    words = [
-        f"Simulation {recording.name}: {recording.t[-1]:.0f} s, {len(result.touches)} touches of the "
-        f"{result.phantom}",
-        f"  effects: {', '.join(n.replace('_', ' ') for n in result.truth['strengths']) or 'none'}",
-    ]
-    for name, size in result.truth.get("sizes", {}).items():
-        left = 1e3 * size["rms_after_best_scale_n"]
-        words.append(
-            f"  {name.replace('_', ' ')} changes the force by {1e3 * size['rms_n']:.3g} mN; {left:.3g} mN "
-            "of that stays when another modulus is fitted"
+def story(result: Simulation) -> say.Story:
+    """What was simulated, and how large each effect is."""
+    yield say.Title(f"Simulated exploration of {result.recording.object_name}")
+    recording, truth = result.recording, result.truth
+    seconds, count = f"{recording.t[-1]:.0f} s", f"{len(result.touches)} touches"
+    yield say.Headline(
+        f"Simulation {recording.name}: {seconds}, {count} of the {result.phantom}", on=say.TEXT
+    )
+    yield say.Detail(f"effects: {', '.join(map(spaced, truth['strengths'])) or 'none'}", on=say.TEXT)
+    each = [f"{spaced(name)} of strength {value:g}" for name, value in truth["strengths"].items()]
+    effects = f"with {listed(each)} (1 is usual)" if each else "without any effect"
+    yield say.Headline(
+        f"{count} in {seconds} of an object of {kpa(truth['young_modulus_pa'], '.1f')}, {effects}",
+        on=say.PAGE,
+    )
+    noise = recording.force_noise_std_n
+    yield say.Sentence(
+        "The recording holds what a device would have read; the truth stands beside it and is used by nobody."
+        + (f" The sensor's noise is {mn(noise)} an axis: a smaller effect is hard to see." if noise else ""),
+        on=say.PAGE,
+    )
+    where = file_words(recording.path, "REC")
+    yield say.Next([
+        f"see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
+        f"`palpate diagnose {where} --model MODEL --report PAGE.html`",
+        "feel it: `palpate touch MODEL`",
+    ])  # fmt: skip
+    yield say.Turned(
+        lambda: view(result),
+        say.Picture(
+            lambda: simulation_figure(result),
+            "Path of the tip, force in time, the longest drag or touch, and some presses; grey and dashed is "
+            "what the ideal object would answer to the same hand.",
+        ),
+    )
+    sizes = truth.get("sizes", {})
+    for name, size in sizes.items():
+        yield say.Detail(
+            f"{spaced(name)} changes the force by {mn(size['rms_n'], '.3g')}; "
+            f"{mn(size['rms_after_best_scale_n'], '.3g')} of that stays when another modulus is fitted",
+            on=say.TEXT,
         )
-    return words
+    if sizes:
+        rows = [
+            [spaced(name), *(f"{1e3 * size[key]:.1f}" for key in ("rms_n", "rms_after_best_scale_n"))]
+            for name, size in sizes.items()
+        ]
+        heads = ["effect", "change of the force [mN]", "left with another modulus [mN]"]
+        yield say.Section("How large each effect is", [say.Rows(heads, rows)])
 
 
-def as_json(result: Simulation) -> dict[str, Any]:
-    """The figures of `palpate simulate --json`, keys with units."""
-    path = result.recording.path
-    return {
-        "recording": None if path is None else str(path),
-        "samples": len(result.recording.t),
-        "duration_s": float(result.recording.t[-1]),
-        "palpations": len(result.touches),
-        "truth": result.truth,
-    }
+KEYS: tuple[say.Key, ...] = (
+    "recording=recording.path",
+    ("samples", lambda result: len(result.recording.t)),
+    ("duration_s", lambda result: result.recording.t[-1]),
+    ("palpations", lambda result: len(result.touches)),
+    "truth",
+)
 
 
 def draw(result: Simulation, ax: Axes) -> None:
@@ -63,63 +95,6 @@ def draw(result: Simulation, ax: Axes) -> None:
 def place(result: Simulation, plotter: Plotter) -> None:
     """The tip's path, coloured by force."""
     measured.place(result.recording, plotter)
-
-
-def report(result: Simulation, path: Path | str) -> Path:
-    """Write one page: what was simulated, the object, and every touch as read beside the ideal object's."""
-    recording, truth = result.recording, result.truth
-    strengths = truth["strengths"]
-    effects = " and ".join(
-        f"{name.replace('_', ' ')} of strength {value:g}" for name, value in strengths.items()
-    )
-    page = Page(f"Simulated exploration of {recording.object_name}")
-    page.lead(
-        f"{len(result.touches)} touches in {recording.t[-1]:.0f} s of an object of "
-        f"{truth['young_modulus_pa'] / 1e3:.1f} kPa, "
-        f"{f'with {effects} (1 is usual)' if effects else 'without any effect'}."
-    )
-    page.paragraph(_meaning(result))
-    page.next_steps(next_steps(result))
-    page.view(
-        view(result),
-        simulation_figure(result),
-        "Path of the tip, force in time, the longest drag or touch, and some presses; grey and dashed is "
-        "what the ideal object would answer to the same hand.",
-    )
-    if truth.get("sizes"):
-        page.heading("How large each effect is")
-        page.table(
-            ["effect", "change of the force [mN]", "left with another modulus [mN]"],
-            [
-                [name.replace("_", " "), *(f"{1e3 * size[key]:.1f}" for key in _SIZES)]
-                for name, size in truth["sizes"].items()
-            ],
-        )
-    page.result(result.as_json())
-    return page.write(path)
-
-
-def next_steps(result: Simulation) -> list[str]:
-    """What to do with the recording."""
-    where = file_words(result.recording.path, "REC")
-    return [
-        f"see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
-        f"`palpate diagnose {where} --model MODEL --report PAGE.html`",
-        "feel it: `palpate touch MODEL`",
-    ]
-
-
-_SIZES = ("rms_n", "rms_after_best_scale_n")
-
-
-def _meaning(result: Simulation) -> str:
-    noise = result.recording.force_noise_std_n
-    words = (
-        "The recording holds what a device would have read; the truth stands beside it and is used by nobody."
-    )
-    if noise:
-        words += f" The sensor's noise is {1e3 * noise:.0f} mN an axis: a smaller effect is hard to see."
-    return words
 
 
 def view(result: Simulation) -> View:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.mechanics.model.material import Ball
+from palpate.words import mm
 
 HALF_TIME_S = 60.0
 
@@ -73,7 +74,7 @@ class Game:
         elif self.answers:
             last = self.answers[-1]
             first = (
-                f"{1000 * last.off_m:.1f} mm beside the nodule after {last.seconds:.0f} s by "
+                f"{mm(last.off_m, '.1f')} beside the nodule after {last.seconds:.0f} s by "
                 f"{last.renderer}: {last.score:.0f} points. Touch anew to go on, Tab for another renderer."
             )
         else:

@@ -24,6 +24,7 @@ from palpate.mechanics.model.model import Model
 from palpate.servo import Servo
 from palpate.window.picture import arrow_matrix
 from palpate.window.worker import Worker, level
+from palpate.words import kpa, mm
 
 
 @dataclass(frozen=True)
@@ -257,12 +258,12 @@ class Guide:
         if state.surface:
             low, high = state.modulus_ci95_pa
             known = (
-                f"{state.made} presses: {state.modulus_pa / 1e3:.1f} kPa ({low / 1e3:.1f} to "
-                f"{high / 1e3:.1f}), surface within {1e3 * state.surface_error_m:.1f} mm"
+                f"{state.made} presses: {kpa(state.modulus_pa, '.1f')} ({low / 1e3:.1f} to "
+                f"{high / 1e3:.1f}), surface within {mm(state.surface_error_m, '.1f')}"
             )
         what = WHAT.get(s.kind, "")
         if self._still_tracing:
             what += f" ({100 * self._tracing.share:.0f} % traced)"
         if s.kind == "press":
-            what = f"press at the ghost, {1e3 * s.depth_m:.0f} mm deep"
+            what = f"press at the ghost, {mm(s.depth_m, '.0f')} deep"
         return [f"{what}: {s.why}", known]

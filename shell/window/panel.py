@@ -17,6 +17,7 @@ from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
 from palpate.window.session import FRICTIONS, MODULUS_STEP
 from palpate.window.widgets import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
 from palpate.window.worker import Frame
+from palpate.words import begun, mm, spaced
 
 T = TypeVar("T")
 WARNING = "#b3261e"
@@ -106,7 +107,7 @@ def main_rows(window: Shown, frame: Frame) -> list[Row]:
 
 def _where(frame: Frame) -> str:
     if frame.touching:
-        return f"{1000 * frame.depth_m:.1f} mm deep, {frame.stiffness_n_per_m:.0f} N/m here"
+        return f"{mm(frame.depth_m, '.1f')} deep, {frame.stiffness_n_per_m:.0f} N/m here"
     return "on the support" if any(np.linalg.norm(v.force_n) > 0.0 for v in frame.views) else "in air"
 
 
@@ -154,7 +155,7 @@ def _status(window: Shown, frame: Frame) -> list[Row]:
     session, worker = window.session, window.session.worker
     rows: list[Row] = []
     if worker.busy:
-        rows.append((Item(f"{worker.busy[0].upper()}{worker.busy[1:]}", size=12),))
+        rows.append((Item(begun(worker.busy), size=12),))
         if worker.share > 0.0:
             rows.append((Item("busy", share=worker.share),))
     elif worker.failure:
@@ -215,7 +216,7 @@ def settings_rows(window: Shown) -> list[Row]:
     if session.model.effects:
         on_off = [("on", True), ("off", False)]
         rows += [
-            *_title(f"Effects: {', '.join(sorted(session.model.effects)).replace('_', ' ')}"),
+            *_title(f"Effects: {', '.join(map(spaced, sorted(session.model.effects)))}"),
             tuple(_choices(session.effects, on_off, session.set_effects)),
         ]
     if window.moved_by_mouse:

@@ -21,12 +21,13 @@ from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
 from palpate.window.widgets import INK
 from palpate.window.worker import Frame, RendererView
+from palpate.words import mm
 
 ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
-STIFFNESS = f"secant stiffness at {1000 * DEPTH_M:.0f} mm (N/m)"
+STIFFNESS = f"secant stiffness at {mm(DEPTH_M, '.0f')} (N/m)"
 SPREAD = 2
 TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
 

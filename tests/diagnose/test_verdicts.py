@@ -22,7 +22,8 @@ from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.presses.gap_bins import gap_by_bin
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.show.demo import diagnosis_json, diagnosis_words
-from palpate.show.diagnosis.words import spoken, verdict
+from palpate.show.diagnosis.words import verdict
+from palpate.words import spoken
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
 

@@ -26,6 +26,7 @@ from palpate.render.fem.renderer import FemRenderer
 from palpate.render.press import Stroke, press
 from palpate.render.scene import TouchScene, in_the_air
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
+from palpate.words import kpa, mm
 
 SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
@@ -102,8 +103,8 @@ def _summary(model: Model) -> str:
     low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
     interval = f" ({low:.1f} to {high:.1f})" if np.isfinite([low, high]).all() else ""
     return (
-        f"Soft object, {model.material.young_modulus_pa / 1e3:.1f} kPa{interval}, felt with a tip of "
-        f"{1e3 * model.tool.tip_radius_m:.3g} mm radius"
+        f"Soft object, {kpa(model.material.young_modulus_pa, '.1f')}{interval}, felt with a tip of "
+        f"{mm(model.tool.tip_radius_m)} radius"
     )
 
 

@@ -6,7 +6,6 @@ import html
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -15,7 +14,10 @@ import numpy as np
 from palpate.batching.plan import THUMBNAIL
 from palpate.batching.summary import Batch, BatchEntry
 from palpate.diagnosis.compare.models import RIVALS
-from palpate.show.page import Page, new_figure
+from palpate.show import story as say
+from palpate.show.diagnosis.words import short_verdict
+from palpate.show.page import new_figure
+from palpate.words import counted, kpa, mn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,29 +36,70 @@ class Cell:
     kind: str = ""
 
 
-def report(result: Batch, path: Path | str) -> Path:
-    """Write the page; thumbnails and reports are linked where they lie, below the page's folder."""
-    page = Page(f"Batch of {_count(result)}")
-    page.part(f"<style>\n{_file('batch.css')}</style>")
-    page.lead(lead(result))
-    page.paragraph(meaning(result))
-    page.next_steps(next_steps(result))
+_NAMED = 12
+"""Recordings and objects that a terminal names."""
+
+
+def story(result: Batch) -> say.Story:
+    """What came out; on the page, thumbnails and reports are linked where they lie, below its folder."""
+    yield say.Title(f"Batch of {counted(len(result.entries), 'recording')}")
+    yield say.Markup(f"<style>\n{_file('batch.css')}</style>")
+    yield from _lines(result)
+    yield say.Headline(lead(result), on=say.PAGE)
+    yield say.Detail(meaning(result), on=say.PAGE)
+    yield say.Next(next_steps(result))
     if result.agreements:
-        _agreement(page, result)
-    page.heading("Recordings")
+        yield say.Section("Repeatability: one object, explored more than once", _agreement(result))
+    yield say.Section("Recordings", _page(result))
+
+
+def _lines(result: Batch) -> say.Story:
+    """In a terminal."""
+    reused = f"{result.tasks} tasks, {result.reused} of them finished before."
+    yield say.Headline(f"{lead(result)} {reused}", on=say.TEXT)
+    yield from (say.Detail(_entry_words(entry), on=say.TEXT) for entry in result.entries[:_NAMED])
+    if (more := len(result.entries) - _NAMED) > 0:
+        yield say.Detail(f"and {more} more (table, or summary.csv)", on=say.TEXT)
+    for a in result.agreements[:_NAMED]:
+        yield say.TextLine(
+            f"{a.object}: {a.count} explorations, {kpa(a.young_modulus_pa)}, spread {100 * a.spread:.1f} %, "
+            f"of their own intervals {100 * a.expected:.1f} %"
+        )
+    if result.undescribed:
+        names = ", ".join(path.name for path in result.undescribed[:3])
+        rest = f" and {len(result.undescribed) - 3} more" if len(result.undescribed) > 3 else ""
+        yield say.TextLine(f"left aside, as no .toml beside describes them: {names}{rest}")
+    yield say.TextLine(f"written to {result.folder / 'index.html'}")
+
+
+def _entry_words(entry: BatchEntry) -> str:
+    row, words = entry.row, []
+    if row.young_modulus_pa is not None:
+        low, high = row.young_modulus_lo_pa or np.nan, row.young_modulus_hi_pa or np.nan
+        words.append(f"{kpa(row.young_modulus_pa)} ({low / 1e3:.2f} to {high / 1e3:.2f})")
+    if row.gap_before_n is not None and row.gap_after_n is not None:
+        gaps = f"gap {1e3 * row.gap_before_n:.0f} to {mn(row.gap_after_n)}"
+        words.append(f"{verdict_words(entry)}, {gaps}")
+    if row.status != "done":
+        words.append(row.status)
+    return f"{row.recording}: {'; '.join(words)}" + (f": {row.reason}" if row.reason else "")
+
+
+def _page(result: Batch) -> say.Story:
     if len(result.entries) > 8:
-        page.part(
+        yield say.Markup(
             '<p><input id="find" type="search" placeholder="find: a name, an object, a verdict" '
             'aria-label="find recordings"></p>'
         )
-    page.part(_recordings(result))
+    yield say.Markup(_recordings(result))
     if "compare" in result.steps:
-        page.paragraph("Errors of FEM and of the best 1D model: rms force at touches that no fit has seen.")
-    page.part('<p>The table as a file: <a href="summary.csv">summary.csv</a>.</p>')
-    _cost(page, result)
-    page.result(result.as_json())
-    page.part(f"<script>\n{_file('batch.js')}</script>")
-    return page.write(path)
+        yield say.Sentence(
+            "Errors of FEM and of the best 1D model: rms force at touches that no fit has seen."
+        )
+    yield say.Markup('<p>The table as a file: <a href="summary.csv">summary.csv</a>.</p>')
+    if cost := _cost(result):
+        yield say.Section("What it cost", [say.Markup(cost)])
+    yield say.Markup(f"<script>\n{_file('batch.js')}</script>")
 
 
 def _file(name: str) -> str:
@@ -66,7 +109,7 @@ def _file(name: str) -> str:
 def lead(result: Batch) -> str:
     """How many are done, failed and waiting, in a sentence."""
     count = {s: sum(e.row.status == s for e in result.entries) for s in ("done", "failed", "waiting")}
-    parts = [f"{count['done']} of {_count(result)} done"]
+    parts = [f"{count['done']} of {counted(len(result.entries), 'recording')} done"]
     if count["failed"]:
         parts.append(f"{count['failed']} failed, with the reason beside")
     if count["waiting"]:
@@ -85,7 +128,7 @@ def meaning(result: Batch) -> str:
         )
     if len(known) > 1:
         return (
-            f"Moduli from {min(known) / 1e3:.1f} to {max(known) / 1e3:.1f} kPa; no object was explored twice."
+            f"Moduli from {min(known) / 1e3:.1f} to {kpa(max(known), '.1f')}; no object was explored twice."
         )
     return "No object was explored twice, so nothing is said about how far explorations agree."
 
@@ -99,20 +142,12 @@ def next_steps(result: Batch) -> list[str]:
     return ["open a recording's page by its name", f"feel one: {feel}"]
 
 
-def _count(result: Batch) -> str:
-    return f"{len(result.entries)} recording" + ("s" if len(result.entries) != 1 else "")
-
-
-def _agreement(page: Page, result: Batch) -> None:
-    page.heading("Repeatability: one object, explored more than once")
-    page.figure(
-        agreement_figure(result),
+def _agreement(result: Batch) -> say.Story:
+    most = f" The {MOST_OBJECTS} objects with most explorations."
+    yield say.Picture(
+        lambda: agreement_figure(result),
         "Young's modulus of every exploration with its 95 % interval, relative to the mean of its object."
-        + (
-            f" The {MOST_OBJECTS} objects with most explorations."
-            if len(result.agreements) > MOST_OBJECTS
-            else ""
-        ),
+        + (most if len(result.agreements) > MOST_OBJECTS else ""),
     )
     heads = ["object", "recordings", "mean modulus [kPa]", "spread between them [%]", "95 % interval of it",
              "expected of their own intervals [%]"]  # fmt: skip
@@ -127,8 +162,8 @@ def _agreement(page: Page, result: Batch) -> None:
         ]
         for a in result.agreements
     ]
-    page.part(_table(heads, [("", row) for row in rows]))
-    page.paragraph(
+    yield say.Markup(_table(heads, [("", row) for row in rows]))
+    yield say.Sentence(
         "Spread: standard deviation of ln E between explorations, about the relative one. Where it is larger "
         "than what the recordings' own intervals let expect, something differs between the explorations that "
         "no single one of them can see. Objects are told apart by the names that the recordings give them."
@@ -194,12 +229,7 @@ def verdict_words(entry: BatchEntry) -> str:
     found = entry.values.get("diagnose")
     if found is None:
         return ""
-    said = [name.replace("_", " ") for name in found["effects"]]
-    if "unknown" in found["kind"]:
-        said.append("something unknown")
-    if found["candidates"] and not said:
-        said = [" or ".join(name.replace("_", " ") for name in found["candidates"])]
-    return " and ".join(said) or str(found["kind"])
+    return short_verdict(str(found["kind"]), found["effects"], found["candidates"])
 
 
 def _thumbnail(result: Batch, name: str) -> Cell:
@@ -238,7 +268,7 @@ def _cell(cell: Cell, name: str) -> str:
     return f'<td{kind} data-name="{html.escape(name)}" data-by="{html.escape(str(cell.by))}">{cell.text}</td>'
 
 
-def _cost(page: Page, result: Batch) -> None:
+def _cost(result: Batch) -> str:
     rows = []
     for step in result.steps:
         known = [e.cost[step] for e in result.entries if step in e.cost]
@@ -252,10 +282,8 @@ def _cost(page: Page, result: Batch) -> None:
                     _number(float(peak.max()), 1e-6, 0),
                 ]
             )
-    if rows:
-        page.heading("What it cost")
-        heads = ["step", "recordings", "CPU, median [s]", "CPU, most [s]", "memory, most [MB]"]
-        page.part(_table(heads, [("", row) for row in rows]))
+    heads = ["step", "recordings", "CPU, median [s]", "CPU, most [s]", "memory, most [MB]"]
+    return _table(heads, [("", row) for row in rows]) if rows else ""
 
 
 def agreement_figure(result: Batch) -> Figure:
@@ -283,7 +311,7 @@ def draw_agreement(ax: Axes, result: Batch) -> Axes:
             [k - 0.42, k + 0.42], 1 - found.spread, 1 + found.spread, color="#2a9d8f", alpha=0.15
         )
     ax.axvline(1, color="#8a96a5", lw=0.8)
-    labels = [f"{a.object}\n{a.young_modulus_pa / 1e3:.1f} kPa" for a in shown]
+    labels = [f"{a.object}\n{kpa(a.young_modulus_pa, '.1f')}" for a in shown]
     ax.set_yticks(range(len(shown)), labels, fontsize=9)
     ax.invert_yaxis()
     ax.set_xlabel("modulus over the mean of its object; band: one standard deviation")

@@ -15,6 +15,7 @@ from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import Colours, draw_object, spread_over
 from palpate.show.view3d import Colouring, Line, View
+from palpate.words import mm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,13 +104,6 @@ def error_bars(result: Comparison) -> Figure:
     return figure
 
 
-def by_press(result: Comparison) -> Figure:
-    """Error of each press for each model."""
-    figure = new_figure(8, 3.2)
-    draw(result, figure.subplots())
-    return figure
-
-
 def draw(result: Comparison, ax: Axes) -> None:
     """Error of each press for each model."""
     from matplotlib.ticker import LogFormatter
@@ -188,7 +182,7 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
         )
     ax.set(
         xlabel="height above the support [mm]" if sideways else "distance from the middle [mm]",
-        ylabel=f"normal force at {DEPTH_M * 1e3:g} mm [N]",
+        ylabel=f"normal force at {mm(DEPTH_M, 'g')} [N]",
     )
     ax.margins(y=0.15)
     ax.legend(frameon=False, fontsize=8, ncol=5, loc="lower center", bbox_to_anchor=(0.5, 1.0))

@@ -1,4 +1,4 @@
-"""A diagnosis: lines, pictures, view, page. Its JSON is the science's own."""
+"""A diagnosis: story, pictures, view. Its JSON is the science's own."""
 
 from __future__ import annotations
 
@@ -9,15 +9,14 @@ import numpy as np
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.show.diagnosis.figures import draw, view
 from palpate.show.diagnosis.gaps import diagnosed, gap_at, sites_of
-from palpate.show.diagnosis.page import next_steps, report
-from palpate.show.diagnosis.words import lines
+from palpate.show.diagnosis.story import story
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import add_arrow, add_dots, add_object, surface_of
 
 if TYPE_CHECKING:
     from pyvista import Plotter
 
-__all__ = ["draw", "lines", "next_steps", "place", "report", "view"]
+__all__ = ["draw", "place", "story", "view"]
 
 
 def place(result: Diagnosis, plotter: Plotter) -> None:

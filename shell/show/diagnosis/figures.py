@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,12 +26,13 @@ from palpate.show.diagnosis.gaps import (
     sites_of,
     worst_press,
 )
-from palpate.show.diagnosis.words import spoken
 from palpate.show.model import facing, usual_colourings, view_of_presses
 from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR, MODULUS
 from palpate.show.scenery import Colours, draw_object, view_axes
+from palpate.show.story import Picture
 from palpate.show.view3d import Colouring, Line, View
+from palpate.words import spoken
 
 MEASURED, IDEAL, IMPROVED, RIVAL = "#1d3557", "#e76f51", "#2a9d8f", "#e9b44c"
 
@@ -148,32 +150,37 @@ def draw(result: Diagnosis, ax: Any) -> None:
     draw_errors(ax, _bars(result), result.noise_n, "typical difference from the measured force [mN]")
 
 
-def curve_pictures(result: Diagnosis) -> list[tuple[Any, str]]:
+def curve_pictures(result: Diagnosis) -> list[Picture]:
     """The mean gap along depth and along speed, a picture each."""
-    made = []
-    for name, along in (
-        ("depth (mm)", "depth [mm]"),
-        ("speed of pressing (mm/s)", "speed of the tip, going in positive [mm/s]"),
-    ):
-        figure = new_figure(5.2, 2.9, layout="constrained")
-        ax = figure.subplots()
-        x, mean, error = result.where.curves[name]
-        ax.errorbar(x, mean * 1e3, error * 1e3, marker="o", ms=4, color=MEASURED)
-        ax.axhline(0, color="#999999", lw=0.8)
-        ax.set(xlabel=along, ylabel="measured less simulated [mN]")
-        ax.spines[["top", "right"]].set_visible(False)
-        of = "depth" if "depth" in name else "speed of the tip"
-        made.append((figure, f"Mean difference at each {of}."))
-    return made
+    return [
+        Picture(partial(_curve, result, "depth (mm)", "depth [mm]"), "Mean difference at each depth."),
+        Picture(
+            partial(_curve, result, "speed of pressing (mm/s)", "speed of the tip, going in positive [mm/s]"),
+            "Mean difference at each speed of the tip.",
+        ),
+    ]
 
 
-def press_pictures(result: Diagnosis, count: int = 3) -> list[tuple[Any, str]]:
+def _curve(result: Diagnosis, name: str, along: str) -> Any:
+    figure = new_figure(5.2, 2.9, layout="constrained")
+    ax = figure.subplots()
+    x, mean, error = result.where.curves[name]
+    ax.errorbar(x, mean * 1e3, error * 1e3, marker="o", ms=4, color=MEASURED)
+    ax.axhline(0, color="#999999", lw=0.8)
+    ax.set(xlabel=along, ylabel="measured less simulated [mN]")
+    ax.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def press_pictures(result: Diagnosis, count: int = 3) -> list[Picture]:
     """Force against time of the presses with the largest gap, after the first, a picture each."""
-    made = []
-    for press in [press for press in ranked(result) if press != worst_press(result)][:count]:
-        figure = new_figure(5.2, 2.9, layout="constrained")
-        ax = figure.subplots()
-        _press(ax, result, int(press))
-        ax.legend(fontsize=8.5, frameon=False)
-        made.append((figure, f"Press {int(press) + 1}."))
-    return made
+    shown = [int(press) for press in ranked(result) if press != worst_press(result)][:count]
+    return [Picture(partial(_one_press, result, press), f"Press {press + 1}.") for press in shown]
+
+
+def _one_press(result: Diagnosis, press: int) -> Any:
+    figure = new_figure(5.2, 2.9, layout="constrained")
+    ax = figure.subplots()
+    _press(ax, result, press)
+    ax.legend(fontsize=8.5, frameon=False)
+    return figure

@@ -15,6 +15,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.show.scenery import spread_over
+from palpate.words import spaced
 
 MOST_EFFECTS = 8
 MOST_SHOWN = 3
@@ -117,7 +118,7 @@ def with_strain(result: Diagnosis, name: str) -> bool:
 
 def beside(result: Diagnosis, name: str) -> str:
     """An effect's name, and finite strain where it was tried beside it."""
-    return name.replace("_", " ") + (f" and {known().replace('_', ' ')}" if with_strain(result, name) else "")
+    return spaced(name) + (f" and {spaced(known())}" if with_strain(result, name) else "")
 
 
 def shown_entries(result: Diagnosis) -> list[Any]:

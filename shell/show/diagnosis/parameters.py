@@ -9,6 +9,7 @@ from typing import Any
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.quantities import fitting_unit, quantity_words, split_key
 from palpate.mechanics.quantities import number_words as number
+from palpate.words import spaced
 
 WORDS = {
     "mu": "friction coefficient",
@@ -57,7 +58,7 @@ def plain_key(key: str, value: Any = None) -> tuple[str, float, str]:
     """(words, factor from SI, unit) of a parameter's key, in units that a hand knows; value: what the unit is
     to fit."""
     unit, factor = fitting_unit(key, value)
-    return WORDS.get(key, split_key(key)[0].replace("_", " ")), factor, unit
+    return WORDS.get(key, spaced(split_key(key)[0])), factor, unit
 
 
 def short(parameters: Mapping[str, Any], words: Mapping[str, str] = MappingProxyType({})) -> str:
@@ -78,7 +79,7 @@ def parameter_rows(result: Diagnosis) -> list[list[str]]:
             for k, (one, least, most) in enumerate(_each(key, value, low, high)):
                 span = "-" if least is None else f"{number(least, factor)} to {number(most, factor)}"
                 said = f"{words} ({_ORDINALS[k]})" if one is not value else words
-                rows.append([entry.name.replace("_", " "), said, number(one, factor), span, unit])
+                rows.append([spaced(entry.name), said, number(one, factor), span, unit])
     return rows
 
 

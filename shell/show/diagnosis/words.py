@@ -3,6 +3,8 @@ where it shows; quantities with units."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from palpate.diagnosis.verdict.result import Diagnosis
@@ -10,6 +12,7 @@ from palpate.mechanics.effects.base import Scope
 from palpate.mechanics.effects.registry import effect
 from palpate.show.diagnosis.gaps import depth_contrast, in_model
 from palpate.show.diagnosis.parameters import short
+from palpate.words import begun, between_words, force_words, listed, mm, percent, place_mm, spaced, spoken
 
 AXIS_WORDS = {
     "depth": "how deep the press is",
@@ -36,42 +39,6 @@ def meaning(name: str) -> str:
 
 LITTLE = 0.1
 """A share of the difference below which it is not said to depend on something."""
-
-
-def spoken(names: tuple[str, ...] | list[str], last: str = "and") -> str:
-    """Effects' names as a list in a sentence."""
-    words = [n.replace("_", " ") for n in names]
-    return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-
-
-def between_words(low: float, high: float) -> str:
-    """An interval of shares: '85 to 91 %', with a decimal where its ends would be one number."""
-    digits = 0 if round(100 * low) != round(100 * high) else 1
-    return f"{100 * low:.{digits}f} to {100 * high:.{digits}f}\u00a0%"
-
-
-def force_words(newtons: float) -> str:
-    """A force in millinewtons, in newtons from one on."""
-    return f"{newtons:.2f} N" if newtons >= 1 else f"{newtons * 1e3:.0f} mN"
-
-
-def percent(share: float) -> str:
-    """A share as a percentage, which no line breaks."""
-    return f"{100 * share:.0f}\u00a0%"
-
-
-def chance_words(p: float) -> str:
-    """A p value as one would say it."""
-    if p < 0.0095:
-        return "less than once in 100"
-    return f"{100 * p:.0f} times in 100" if p < 0.995 else "always"
-
-
-def share_words(value: float | None) -> str:
-    """A share of the gap that is closed."""
-    if value is None:
-        return "-"
-    return percent(value) if value >= 0 else "none (worse)"
 
 
 def missing(result: Diagnosis) -> tuple[str, ...]:
@@ -111,7 +78,7 @@ def consequence(result: Diagnosis, force_rms_n: float) -> str:
     if result.kind == "none":
         return f"A typical touch is simulated to {before}, {size}; the sensor's noise alone is {noise}."
     words = "; ".join(_what_it_is(result, name) for name in missing(result) or result.effects)
-    said = f"{words[:1].upper()}{words[1:]}. " if words else ""
+    said = f"{begun(words)}. " if words else ""
     if not result.effects:
         return f"A typical touch is off by {before}, {size}; the sensor's noise alone is {noise}."
     after, them = force_words(result.gap_after_n), "it" if len(result.effects) == 1 else "them"
@@ -135,17 +102,17 @@ def _what_it_is(result: Diagnosis, name: str) -> str:
 
 def answers(result: Diagnosis) -> list[tuple[str, str, str]]:
     """(question, answer, sentences) of how sure, where, how far."""
-    return [_how_sure(result), _where(result), _how_far(result)]
+    return [how_sure(result), where(result), _how_far(result)]
 
 
-def _how_sure(result: Diagnosis) -> tuple[str, str, str]:
+def how_sure(result: Diagnosis) -> tuple[str, str, str]:
     question = "How sure is it?"
     if result.kind == "none":
         return question, "As sure as these touches are", (
             "Smaller effects than the noise may be there; deeper, faster or longer touches would show them."
         )  # fmt: skip
     if result.candidates:
-        also = "; ".join(f"{n.replace('_', ' ')}: {meaning(n)}" for n in result.candidates)
+        also = "; ".join(f"{spaced(n)}: {meaning(n)}" for n in result.candidates)
         text = f"Not ruled out: {also}. The touch proposed below would tell."
         return question, "These touches cannot tell", text
     if not result.effects:
@@ -161,15 +128,15 @@ def _how_sure(result: Diagnosis) -> tuple[str, str, str]:
     )
     if len(sure) == 1:
         return question, f"{percent(sure[least])} sure", text
-    each = ", ".join(f"{name.replace('_', ' ')} {percent(share)}" for name, share in sure.items())
-    return question, each[0].upper() + each[1:], text
+    each = ", ".join(f"{spaced(name)} {percent(share)}" for name, share in sure.items())
+    return question, begun(each), text
 
 
-def _where(result: Diagnosis) -> tuple[str, str, str]:
+def where(result: Diagnosis) -> tuple[str, str, str]:
     """Where it differs, told so that it fits what was named: a component of the force is no cause."""
     axis = result.where.leading
-    x, y, z, rms = result.where.worst[0]
-    largest = f"({x * 1e3:.0f}, {y * 1e3:.0f}, {z * 1e3:.0f}) mm"
+    *there_m, rms = result.where.worst[0]
+    largest = place_mm(there_m)
     question = "Where does it show?"
     if result.kind == "none":
         text = (
@@ -218,60 +185,30 @@ def _how_far(result: Diagnosis) -> tuple[str, str, str]:
     return question, f"It stays at {before}", text + " With no effect found, nothing of it is gone."
 
 
-def lines(result: Diagnosis) -> list[str]:
-    """What a terminal says: the answer, what it is, how far it goes, where it shows, how sure it is."""
-    ends = [f"{each} stands at the end of its range" for each in result.at_bound]
-    text = [f"verdict: {'; '.join([verdict(result), *ends])}"]
-    text += [f"which: {_named(result, name)}" for name in result.effects]
-    off = f"how far: a typical touch is {force_words(result.gap_before_n)} off"
-    noise = f"; the sensor's noise is {force_words(result.noise_n)}"
-    if result.gap_closed is not None and result.gap_closed_ci95 is not None and result.effects:
-        text.append(f"{off}, {force_words(result.gap_after_n)} with what was found{noise}")
-        text.append(
-            f"  {percent(result.gap_closed)} of what lies above the noise is gone (95 % sure: "
-            f"{between_words(*result.gap_closed_ci95)}), at places that were not fitted"
-        )
-    else:
-        text.append(f"{off}{noise}")
-    if result.constant_n is not None:
-        text.append(f"  a constant push instead of a model would be {force_words(result.constant_n)} off")
-    _, where, because = _where(result)
-    text.append(f"where: {_small(where)}")
-    text.append(f"  {because}".replace(" (the press shown)", ""))
-    _, sure, _ = _how_sure(result)
-    text.append(f"how sure: {_small(sure)}")
-    text += [f"  {reason}" for reason in result.reasons]
-    if result.exact is not None:
-        text.append(f"touched places are solved: {result.exact.said}")
-    if result.next_touch is not None and result.unsettled:
-        text.append(f"next touch: {touch_words(result)}")
-    if result.left_out:
-        text.append(
-            f"not tried (these presses cannot show it, or --fast leaves it out): {spoken(result.left_out)}"
-        )
-    return [line.replace("\u00a0", " ") for line in text]
-
-
-def _small(words: str) -> str:
-    return words[:1].lower() + words[1:]
-
-
-def _named(result: Diagnosis, name: str) -> str:
+def named(result: Diagnosis, name: str) -> str:
+    """An effect that was named, what it is, and whether the model has it already."""
     there = ", which the model already has" if name in in_model(result) else ""
-    return f"{name.replace('_', ' ')}: {_what_it_is(result, name)}{there}"
+    return f"{spaced(name)}: {_what_it_is(result, name)}{there}"
+
+
+def short_verdict(kind: str, effects: Sequence[str], candidates: Sequence[str]) -> str:
+    """In a few words: 'viscoelasticity', 'force bias or force drift', 'none'."""
+    said = [*map(spaced, effects), *(["something unknown"] if "unknown" in kind else [])]
+    if candidates and not said:
+        said = [spoken(candidates, "or")]
+    return listed(said) or kind
 
 
 def touch_words(result: Diagnosis) -> str:
     """Where and how to touch next, and what that would tell."""
     touch = result.next_touch
     assert touch is not None
-    parted = " from ".join(n.replace("_", " ") for n in touch.separates)
+    parted = " from ".join(map(spaced, touch.separates))
     if touch.kind != "press":
         return f"to tell {parted}: {touch.why}"
-    x, y, z = (1e3 * v for v in (touch.x, touch.y, touch.z))
     direction = ", ".join(f"{round(d, 2) + 0.0:g}" for d in touch.direction)
     hold = f", and hold for {touch.hold_s:.1f} s" if touch.hold_s > 0.05 else ""
     return (
-        f"to tell {parted}, press at ({x:.0f}, {y:.0f}, {z:.0f}) mm in the direction ({direction}), "
-        f"{touch.depth_m * 1e3:.1f} mm deep at {touch.speed_m_per_s * 1e3:.0f} mm/s{hold}: {touch.why}"
+        f"to tell {parted}, press at {place_mm((touch.x, touch.y, touch.z))} in the direction ({direction}), "
+        f"{mm(touch.depth_m, '.1f')} deep at {mm(touch.speed_m_per_s, '.0f')}/s{hold}: {touch.why}"
     )

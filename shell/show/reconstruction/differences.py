@@ -8,6 +8,7 @@ from palpate.reconstruction.pipeline import Reconstruction
 from palpate.reconstruction.steps.s6_one_d import low_passed
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.show.reconstruction.modulus import height_trends
+from palpate.words import mm
 
 _CHANCE = 0.05
 """How often chance alone may do what is called a trend."""
@@ -29,8 +30,8 @@ def _touches(result: Reconstruction) -> str:
     depth, peak = presses.depth_m, np.array([size[curves.rows([i])].max() for i in range(len(presses))])
     return (
         f"Touches. The paper counts contacts above {_PAPER_THRESHOLD_N:g} N and reads each press at "
-        f"{_PAPER_INDENTATION_M * 1e3:g} mm. Here {len(presses)} presses reach {depth.min() * 1e3:.1f} to "
-        f"{depth.max() * 1e3:.1f} mm and peak at {peak.min():.2f} to {peak.max():.2f} N: "
+        f"{mm(_PAPER_INDENTATION_M, 'g')}. Here {len(presses)} presses reach {depth.min() * 1e3:.1f} to "
+        f"{mm(depth.max(), '.1f')} and peak at {peak.min():.2f} to {peak.max():.2f} N: "
         f"{np.sum(peak > _PAPER_THRESHOLD_N)} peak above 1 N, {np.sum(depth >= _PAPER_INDENTATION_M)} "
         "reach 10 mm."
     )
@@ -40,7 +41,7 @@ def _first_touch(result: Reconstruction) -> str:
     error = np.median(result.exploration.presses.onset_error_m)
     words = (
         "First touch. The paper goes back from its threshold to where the force began to rise. Here a "
-        f"contact law is fitted to the rise; its stated error is {error * 1e3:.3f} mm in the median."
+        f"contact law is fitted to the rise; its stated error is {mm(error, '.3f')} in the median."
     )
     if result.exploration.delay_s:
         words += (

@@ -144,16 +144,26 @@ def spread(ax: Axes, samples: list[np.ndarray], names: list[str], stars: list[fl
     return ax
 
 
-def exploration_figures(result: Reconstruction) -> dict[str, Figure]:
-    """`figure-2` and `figure-3`, by file name."""
-    over_time, ax = subplots(1, 1, figsize=(10, 3.2), layout=None)
+def touches_figure(result: Reconstruction) -> Figure:
+    """Figure 2."""
+    figure, ax = subplots(1, 1, figsize=(10, 3.2), layout=None)
     force_over_time(ax, result.exploration)
-    geometry, axes = subplots(1, 3, figsize=(13.5, 4), layout=None)
+    return figure
+
+
+def geometry_figure(result: Reconstruction) -> Figure:
+    """Figure 3 (a) to (c)."""
+    figure, axes = subplots(1, 3, figsize=(13.5, 4), layout=None)
     touched_points(axes[0], result.exploration)
     meshed_object(axes[1], result)
     force_profiles(axes[2], result)
     for ax, name in zip(axes, "abc", strict=True):
         ax.set_title(f"({name})", loc="left", fontsize=10)
-    damped, small = subplots(1, 5, figsize=(13.5, 2.8))
-    damped_parameters(small, result)
-    return {"figure-2": over_time, "figure-3abc": geometry, "figure-3d": damped}
+    return figure
+
+
+def damped_figure(result: Reconstruction) -> Figure:
+    """Figure 3(d)."""
+    figure, axes = subplots(1, 5, figsize=(13.5, 2.8))
+    damped_parameters(axes, result)
+    return figure

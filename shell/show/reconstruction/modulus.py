@@ -10,6 +10,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.stats import pearsonr, spearmanr
 
 from palpate.mechanics.model.model import Model
+from palpate.reconstruction.pipeline import Reconstruction
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.show.page import subplots
@@ -199,3 +200,14 @@ def quality_histogram(ax: Axes, values: np.ndarray, label: str, bound: float, wo
         ax.axvline(bound, color=PEAK_COLOUR, lw=1.5, label=f"{word} {bound:g}")
     ax.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return ax
+
+
+def mesh_figure(result: Reconstruction) -> Figure:
+    """Qualities of the mesh."""
+    report = result.meshing.report
+    figure, axes = subplots(1, 3, figsize=(12, 2.8))
+    quality_histogram(axes[0], report.radius_edge_ratio, "radius-edge ratio", 2.0)
+    wanted = result.model.mesh_size_m * 1e3
+    quality_histogram(axes[1], report.edge_m * 1e3, "edge length [mm]", wanted, "wanted")
+    quality_histogram(axes[2], report.surface_distance_m * 1e3, "distance to the surface [mm]", 2.0)
+    return figure

@@ -15,9 +15,9 @@ from palpate.mechanics.shape.refine import refined_near_surface, typical_edge
 from palpate.reconstruction.pipeline import Reconstruction
 from palpate.reconstruction.steps.s6_one_d import OneD, fit_paper, fit_robust, profiles
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import nearest_nodes
-from palpate.show.diagnosis.words import chance_words
-from palpate.show.page import Page
 from palpate.show.reconstruction.modulus import Trend
+from palpate.show.story import Rows, Sentence, Story
+from palpate.words import chance_words
 
 PAPER_TABLE = (
     ("paper #1", "cylinder radius 0.040 height 0.080", 29.0, 28.73),
@@ -116,25 +116,25 @@ def point_load_rows(result: Reconstruction) -> list[list[Any]]:
     return rows
 
 
-def one_d_table(page: Page, result: Reconstruction) -> None:
-    page.paragraph("The paper's estimators and the robust ones, medians over the palpations:")
-    page.table(*one_d_comparison(result))
+def one_d_table(result: Reconstruction) -> Story:
+    yield Sentence("The paper's estimators and the robust ones, medians over the palpations:")
+    yield Rows(*one_d_comparison(result))
 
 
 _PARAMETERS = {"k_v": "stiffness k_V", "k_h": "stiffness k_H", "e_pa": "modulus e"}
 
 
-def trends_table(page: Page, trends: list[Trend]) -> None:
+def trends_table(trends: list[Trend]) -> Story:
     if not trends:
-        page.paragraph("Fewer than five presses on the side: no trend with height can be told.")
+        yield Sentence("Fewer than five presses on the side: no trend with height can be told.")
         return
-    page.paragraph(
+    yield Sentence(
         f"Does a parameter go with the height of the {trends[0].presses} presses on the side? The stiffness "
         "of a 1D model does, since the glued base is near; a modulus should change little: see the last "
         "column. A correlation is 0 where they have nothing to do with one another, and 1 or -1 where one "
         "follows from the other; even a change of 1 % may correlate well."
     )
-    page.table(
+    yield Rows(
         [
             *("parameter", "correlation with height", "chance alone does this"),
             *("the same by rank", "chance alone does that", "change over the height"),
@@ -149,26 +149,26 @@ def trends_table(page: Page, trends: list[Trend]) -> None:
     )
 
 
-def point_load_table(page: Page, result: Reconstruction) -> None:
-    page.paragraph(
+def point_load_table(result: Reconstruction) -> Story:
+    yield Sentence(
         "Why the paper's modulus depends on the mesh: displacement of a loaded node per newton (linear "
         "tetrahedra) as the mesh is refined near the surface, beside that of a load spread over a patch "
         "(quadratic tetrahedra)."
     )
-    page.table(
+    yield Rows(
         ["surface edge [mm]", "nodes (linear)", "point load, linear [mm/N]", "patch, quadratic [mm/N]"],
         point_load_rows(result),
     )
 
 
-def speed_table(page: Page, result: Reconstruction) -> None:
+def speed_table(result: Reconstruction) -> Story:
     total = {**result.seconds, "whole": sum(result.seconds.values())}
     remade = paper_remade(result)
     rows: list[list[object]] = [
         [name, f"{seconds:.1f}", *([PAPER_SECONDS.get(name, float("nan"))] if remade else [])]
         for name, seconds in total.items()
     ]
-    page.paragraph(
+    yield Sentence(
         "How long the steps took on this machine" + (", and what the paper states:" if remade else ":")
     )
-    page.table(["step", "time [s]", *(["paper [s]"] if remade else [])], rows)
+    yield Rows(["step", "time [s]", *(["paper [s]"] if remade else [])], rows)

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+import palpate.show  # noqa: F401  who says results
 from benchmarks._tissue import tissue
 from palpate.diagnosis.compare.comparison import Along, CompareOptions, compare_presses
 from palpate.diagnosis.compare.models import HOMOGENEOUS, RIVALS, as_touched
 from palpate.mechanics.compliance import field_response as solved_fields
 from palpate.mechanics.presses.making import PathErrors, of_paths
 from palpate.reconstruction.steps.s7_modulus.modulus_field import asked_for, fit_field
-from palpate.show.comparison import lines
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -111,13 +111,13 @@ def test_a_1d_model_that_wins_is_in_the_first_line_with_floor_and_ceiling_below(
     half = {**won.rmse_n, "hunt-crossley": 0.5 * won.rmse_n["fem"]}
     lost = dataclasses.replace(won, rmse_n=half)
     assert (
-        lines(lost)[0] == "A 1D model (Hunt–Crossley) predicts the next touch 2.0 times better than the FEM."
+        lost.lines()[0] == "A 1D model (Hunt–Crossley) predicts the next touch 2.0 times better than the FEM."
     )
-    assert not lines(won)[0].startswith("A 1D model")
+    assert not won.lines()[0].startswith("A 1D model")
     for result in (won, lost):
         noise, constant = 1e3 * result.noise_n, 1e3 * result.constant_n
-        assert f"the sensor's noise {noise:.0f} mN, a constant push" in lines(result)[-2]
-        assert lines(result)[-2].endswith(f" {constant:.0f} mN")
+        assert f"the sensor's noise {noise:.0f} mN, a constant push" in result.lines()[-2]
+        assert result.lines()[-2].endswith(f" {constant:.0f} mN")
     assert result.noise_n < won.rmse_n["fem"] < won.constant_n
 
 

@@ -13,7 +13,7 @@ from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.specimen.yielding import machine_of, way_of
 from palpate.mechanics.contact.dent import dent_law
-from palpate.show.material import as_json, in_words, lines
+from palpate.show.material import in_words
 
 RADIUS = 0.005
 
@@ -52,7 +52,7 @@ def test_a_machine_that_yields_is_told_with_its_stiffness(modulus, share):
     assert made.young_modulus_pa == pytest.approx(modulus, rel=0.07)
     low, high = made.young_modulus_ci95_pa
     assert low <= made.young_modulus_pa <= high
-    assert "{" not in "\n".join(lines(made)) and "N/mm" in "\n".join(lines(made))
+    assert "{" not in "\n".join(made.lines()) and "N/mm" in "\n".join(made.lines())
 
 
 @pytest.mark.parametrize("law", ["sphere", "neo-hookean", "linear"])
@@ -68,7 +68,7 @@ def test_a_rigid_machine_is_not_named_whatever_the_law(law):
 def test_a_slope_of_free_air_is_taken_off_and_said():
     made = material(curves(2e4, 1e9, slope=60.0))
     assert made.effects == ()
-    assert "free air slopes by" in str(lines(made))
+    assert "free air slopes by" in str(made.lines())
 
 
 @pytest.mark.slow
@@ -89,16 +89,16 @@ def test_an_answer_that_misses_more_than_a_constant_says_so_first():
     swings[-1] = 1.7
     made = material([MachineCycle(np.arange(400) / 100, travel, swings, name) for name in "ab"])
     assert made.missed > made.error["constant"] and not made.predicts
-    assert "NO ANSWER" in lines(made)[0] and as_json(made)["predicts"] is False
+    assert "NO ANSWER" in made.lines()[0] and made.as_json()["predicts"] is False
 
 
 def test_what_was_named_in_vain_is_in_the_first_line():
     error = {"ideal": 0.39, "verdict": 0.41, "constant": 0.56, "kelvin-voigt": 0.5, "hunt-crossley": 0.5}
     said = "tip radius explains the gap"
     made = Material("indentation", ("a",), 6, "curves", 4e4, (3e4, 5e4), "linear", error, said)
-    assert "the ideal model predicts held-out data better than with what was found" in lines(made)[0]
+    assert "the ideal model predicts held-out data better than with what was found" in made.lines()[0]
     better = dataclasses.replace(made, error={**error, "verdict": 0.38})
-    assert "the ideal model" not in lines(better)[0]
+    assert "the ideal model" not in better.lines()[0]
 
 
 def test_a_loop_of_creep_widens_the_interval_down_to_the_lasting_modulus_and_is_said():
@@ -110,7 +110,7 @@ def test_a_loop_of_creep_widens_the_interval_down_to_the_lasting_modulus_and_is_
     force += 0.002 * force.max() * np.random.default_rng(2).standard_normal(len(force))
     made = material([MachineCycle(np.arange(len(dent)) / 100, dent, force, "one")])
     low, high = made.young_modulus_ci95_pa
-    assert low < 20e3 < high and "creep, a late force or play" in " ".join(lines(made))
+    assert low < 20e3 < high and "creep, a late force or play" in " ".join(made.lines())
     assert "pulls" not in made.verdict, "noise alone pulls by no more"
     depth, measured, predicted, *_ = made.seen
     way_in = slice(0, int(np.argmax(measured)))

@@ -9,12 +9,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+import palpate.show  # noqa: F401  who says results
 from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.specimen.zero import late_contact
 from palpate.mechanics.contact.dent import dent_law
-from palpate.show.material import lines
 
 RADIUS, MODULUS = 0.005, 3e4
 ANSWERS: dict[tuple, Material] = {}
@@ -45,7 +45,7 @@ def material(*curves: MachineCycle) -> Material:
 @pytest.mark.parametrize("count", [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_late_contact_is_said_and_the_modulus_is_right(count):
     made = material(*[curve(k, begins=0.25) for k in range(count)])
-    said = "\n".join(lines(made))
+    said = "\n".join(made.lines())
     assert "before the first row" in said and "the modulus would be" in said
     assert made.young_modulus_pa == pytest.approx(MODULUS, rel=0.06)
     low, high = made.young_modulus_ci95_pa
@@ -60,10 +60,10 @@ def test_a_wrong_zero_is_no_late_contact(begins):
 
 def test_a_bias_is_said_with_the_modulus_that_it_would_make():
     made = material(*[curve(k, begins=-0.2, zero=0.2) for k in range(3)])
-    said = "\n".join(lines(made))
+    said = "\n".join(made.lines())
     assert "0.2 N in free air" in said
     assert made.young_modulus_pa == pytest.approx(MODULUS, rel=0.06)
-    assert "free air" not in "\n".join(lines(material(*[curve(k, begins=-0.2) for k in range(3)])))
+    assert "free air" not in "\n".join(material(*[curve(k, begins=-0.2) for k in range(3)]).lines())
 
 
 def test_an_interval_of_few_curves_holds_what_they_differ_in_beside_the_fits_own_error():
@@ -84,11 +84,11 @@ def test_an_interval_of_few_curves_holds_what_they_differ_in_beside_the_fits_own
 def test_what_stands_at_its_bound_is_in_the_first_line_and_fails_only_where_it_carries_the_modulus():
     made = material(curve(0, begins=-0.2))
     bound = dataclasses.replace(made, at_bound=("friction slip: mu",))
-    assert bound.predicts and "friction slip: mu stands at the end of its range" in lines(bound)[0]
+    assert bound.predicts and "friction slip: mu stands at the end of its range" in bound.lines()[0]
     carried = dataclasses.replace(bound, bound_carries=True)
-    assert not carried.predicts and "NO ANSWER" in lines(carried)[0]
+    assert not carried.predicts and "NO ANSWER" in carried.lines()[0]
     error = {made.law: 0.2, "kelvin-voigt": 0.1, "hunt-crossley": 0.15, "constant": 1.0}
     beaten = dataclasses.replace(made, error=error)
-    assert beaten.predicts and "kelvin-voigt predicts held-out data better" in lines(beaten)[0]
+    assert beaten.predicts and "kelvin-voigt predicts held-out data better" in beaten.lines()[0]
     closed = dataclasses.replace(made, closed=1.02, closed_ci95=(0.9, 1.1))
-    assert "takes away 100 % of the gap (95 % sure: 90 to 100 %)" in "\n".join(lines(closed))
+    assert "takes away 100 % of the gap (95 % sure: 90 to 100 %)" in "\n".join(closed.lines())

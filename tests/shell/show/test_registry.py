@@ -18,7 +18,7 @@ from matplotlib.image import imread
 from palpate import show
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.result import Result
-from palpate.show.page import Page
+from palpate.show.story import Headline, Next, Title
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,11 +40,10 @@ def _module() -> ModuleType:
 
     module = ModuleType("weighed")
 
-    def lines(result):
-        return [f"{1e3 * result.mass_kg:.0f} g"]
-
-    def as_json(result):
-        return {"mass_kg": result.mass_kg}
+    def story(result):
+        yield Title("Weighed")
+        yield Headline(f"{1e3 * result.mass_kg:.0f} g")
+        yield Next(["weigh it again"])
 
     def draw(result, ax):
         ax.bar(["mass"], [result.mass_kg])
@@ -54,13 +53,9 @@ def _module() -> ModuleType:
         add_dots(plotter, result.places)
         look_around(plotter, np.array([0.0, 0.0, 1.0]), result.places)
 
-    def report(result, path):
-        page = Page("Weighed")
-        page.lead(lines(result)[0])
-        return page.write(path)
-
-    for function in (lines, as_json, draw, place, report):
+    for function in (story, draw, place):
         setattr(module, function.__name__, function)
+    vars(module)["KEYS"] = ("mass_kg",)
     return module
 
 
@@ -78,7 +73,9 @@ def test_a_new_result_prints_plots_shows_and_reports(weighed, tmp_path):
     assert ax.get_ylabel() == "mass [kg]" and ax.patches[0].get_height() == 0.25
     weighed.show(screenshot=tmp_path / "scene.png")
     assert np.ptp(imread(tmp_path / "scene.png")[..., :3]) > 0.2
-    assert "250 g" in weighed.report(tmp_path / "page.html").read_text()
+    written = weighed.report(tmp_path / "page.html").read_text()
+    assert '<p class="lead">250 g.</p>' in written and "What to do next: weigh it again." in written
+    assert show.next_lines(weighed) == ["next: weigh it again"]
     page = weighed._repr_html_()
     assert "<pre>250 g</pre>" in page and "data:image/png;base64," in page
     assert weighed.view() is None
@@ -107,7 +104,7 @@ def test_every_kind_of_result_is_there_and_shown(kind, module):
     assert issubclass(found, Result)
     shown = module if isinstance(module, ModuleType) else importlib.import_module(f"palpate.show.{module}")
     assert callable(shown.draw)
-    assert hasattr(shown, "lines") or found.lines is not Result.lines
+    assert hasattr(shown, "story") or found.lines is not Result.lines
 
 
 def test_without_palpate_a_result_prints_its_numbers_and_says_what_to_import():

@@ -1,0 +1,420 @@
+"""The story of a reconstruction: the model and how it came about; then the paper's figures and table, remade
+from a recording, beside its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.model.model import Model
+from palpate.reconstruction.pipeline import Reconstruction
+from palpate.reconstruction.steps.s4_surface import Surface
+from palpate.reconstruction.steps.s6_one_d import low_passed
+from palpate.show import story as say
+from palpate.show.model import local, rms_by_press, usual_colourings, view_of_presses
+from palpate.show.page import file_words, subplots
+from palpate.show.quantities import ERROR, MODULUS, softness
+from palpate.show.reconstruction.differences import differences, trend_words
+from palpate.show.reconstruction.exploration import damped_figure, geometry_figure, touches_figure
+from palpate.show.reconstruction.modulus import (
+    depth_figure,
+    height_trends,
+    mesh_figure,
+    moduli_figure,
+    over_surface,
+    spatial_figure,
+    undamped_figure,
+)
+from palpate.show.reconstruction.tables import (
+    one_d_table,
+    paper_remade,
+    point_load_table,
+    speed_table,
+    table_one,
+    trends_table,
+)
+from palpate.show.scenery import Colours, draw_object, draw_touched
+from palpate.show.view3d import Colouring, Line, View
+from palpate.words import begun, counted, kpa, mm, mn, place_mm, sure_kpa
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+_NAMED = 12
+"""Contacts that a terminal names."""
+
+
+def story(result: Reconstruction, beside: dict[str, Model] | None = None) -> say.Story:
+    """The answer, the object, how it came about; then the paper's figures and tables, remade.
+
+    beside: other models by name, drawn beside in Figures 4 and 6 and in Table 1.
+    """
+    yield say.Title(f"Reconstruction of {result.exploration.recording.name}", suffixed=True, pictures="own")
+    model, exploration = result.model, result.exploration
+    presses, worse = f"{len(exploration.presses)} presses", lost(result)
+    modulus, ends = model.material.young_modulus_pa, model.material.young_modulus_ci95_pa
+    yield say.Headline(
+        f"{exploration.recording.name}: {presses}, {worse}Young's modulus {kpa(modulus)} ({sure_kpa(ends)})",
+        on=say.TEXT,
+    )
+    yield say.Headline(
+        f"{begun(worse)}{presses} became a model of {kpa(modulus, '.1f')} (Young's modulus; "
+        f"{sure_kpa(ends, '.1f')})",
+        on=say.PAGE,
+    )
+    yield from _meant(result)
+    yield say.Next(next_steps(result))
+    for finding in result.findings:
+        yield say.TextLine(finding.line())
+        yield say.Detail(finding.line(), on=say.PAGE)
+    yield from _made(result)
+    yield say.Turned(
+        lambda: view(result),
+        say.Picture(
+            lambda: object_figure(model),
+            "Left: first touches and fixed base. Right: the modulus of single presses, and where.",
+            name="object",
+        ),
+        model,
+    )
+    yield say.Section("", _how(result))
+    models, name = {exploration.recording.name: model, **(beside or {})}, exploration.recording.name
+    yield say.Section("Exploration and geometry", _explored(result), evidence=True)
+    yield say.Section("1D models", _one_d(result, models), evidence=True)
+    other = next(iter((beside or {}).items()), None)
+    yield say.Section("Where the parameters hold", _places(result, name, other), evidence=True)
+    yield say.Section("Modulus", _modulus(result, models, beside or {}), evidence=True)
+    yield say.Section("Where this differs from the paper, and why", _differs(result), evidence=True)
+
+
+def _meant(result: Reconstruction) -> say.Story:
+    if result.doubt:
+        yield say.TextLine(f"not to be believed: {result.doubt}")
+    else:
+        yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in meaning(result).split(". "))
+    yield say.Detail(meaning(result), on=say.PAGE)
+
+
+def _made(result: Reconstruction) -> say.Story:
+    """How it came about, in a terminal's lines."""
+    exploration, surface, mesh = result.exploration, result.surface, result.model.mesh
+    not_used = _not_used(result)
+    if not_used:
+        yield say.TextLine(f"{counted(len(not_used), 'contact')} not used:")
+    yield from (say.Detail(f"at {t:.2f} s: {reason}", on=say.TEXT) for t, reason in not_used[:_NAMED])
+    if (more := len(not_used) - _NAMED) > 0:
+        yield say.Detail(f"and {more} more (as_json, or --json, names all)", on=say.TEXT)
+    if result.modulus:
+        yield say.TextLine(f"modulus: {result.modulus.reason}")
+    if result.exact:
+        by_table = kpa(result.exact.by_table.modulus_pa)
+        yield say.Detail(
+            f"by the law's table it would be {by_table} ({result.exact.presses.said})", on=say.TEXT
+        )
+    if exploration.delay_s:
+        yield say.TextLine(
+            f"the force reads {exploration.delay_s * 1e3:.0f} +- {exploration.delay_error_s * 1e3:.1f} "
+            "ms late (first against last touch); corrected before everything else"
+        )
+    yield from (say.TextLine(dropped) for dropped in exploration.dropped)
+    yield say.TextLine(f"surface: {surface.method}, {surface.volume_m3 * 1e6:.1f} cm³; {surface.reason}")
+    if surface.shape is None:
+        yield say.Detail(least_known(surface), on=say.TEXT)
+    yield from (say.Detail(note, on=say.TEXT) for note in (result.placed.notes if result.placed else ()))
+    off = mm(result.meshing.report.surface_distance_m.max(), ".2f")
+    yield say.TextLine(
+        f"mesh: {len(mesh.tetrahedra)} tetrahedra of {mm(result.model.mesh_size_m, 'g')} ({len(mesh.points)} "
+        f"nodes), at most {off} off the surface"
+    )
+
+
+def _explored(result: Reconstruction) -> say.Story:
+    yield say.Sentence(
+        "From here on: the figures and tables of the paper whose method this is, remade from this recording "
+        "(Goksel, Jeon, Harders and Székely, Deformable Haptic Model Generation Through Manual Exploration)."
+    )
+    yield say.Picture(
+        lambda: touches_figure(result),
+        "Force magnitude, first touches (o) and peaks (+) (the paper's Figure 2).",
+        name="figure-2",
+    )
+    yield say.Picture(
+        lambda: geometry_figure(result),
+        "(a) First touches (+) and base outline with its farthest-point sample (o); (b) mesh, fixed base "
+        "nodes and the nodes nearest to the contacts, in order; (c) force over depth of every palpation (the "
+        "paper's Figure 3).",
+        name="figure-3abc",
+    )
+    if rows := _not_used(result):
+        yield say.Sentence(f"Contacts not used ({len(rows)}):")
+        yield say.Rows(["at [s]", "why"], [[float(t), reason] for t, reason in rows])
+    yield say.Picture(lambda: mesh_figure(result), _mesh_words(result), name="figure-mesh")
+
+
+def _one_d(result: Reconstruction, models: dict[str, Model]) -> say.Story:
+    yield say.Picture(
+        lambda: damped_figure(result),
+        "A spring k and a damper b for each press: proportional to depth (Kelvin–Voigt, KV), or to a power r "
+        "of it (Hunt–Crossley, HC); a dot is a press (the paper's Figure 3(d)).",
+        name="figure-3d",
+    )
+    yield say.Picture(
+        lambda: undamped_figure(models),
+        "The same without the damper: (a) k_V, a spring alone; (b, c) k_C, one of a power r of depth; (d) "
+        "k_H, the same at the mean power of all presses (the paper's Figure 4).",
+        name="figure-4",
+    )
+    yield from one_d_table(result)
+
+
+def _places(result: Reconstruction, name: str, other: tuple[str, Model] | None) -> say.Story:
+    yield say.Picture(
+        lambda: spatial_figure(result.model, name, other),
+        "Above, k_V over the surface (radial basis functions through the presses, dots); below, k_V, k_H and "
+        "e over height on the side, relative to their means and on one scale (the paper's Figure 5).",
+        name="figure-5",
+    )
+    yield from trends_table(height_trends(result.model))
+    if words := trend_words(result):
+        yield say.Sentence(words)
+
+
+def _modulus(result: Reconstruction, models: dict[str, Model], beside: dict[str, Model]) -> say.Story:
+    yield say.Picture(
+        lambda: moduli_figure(models),
+        "(a) Moduli of single palpations, * the global one with its 95 % interval; (b) where (the paper's "
+        "Figure 6).",
+        name="figure-6",
+    )
+    yield say.Rows(*table_one(result, beside))
+    fit = result.modulus
+    if fit and fit.by_depth:
+        yield say.Picture(
+            lambda: depth_figure(fit),
+            "Global modulus from samples up to a greatest depth.",
+            name="figure-depth",
+        )
+    yield from point_load_table(result)
+
+
+def _differs(result: Reconstruction) -> say.Story:
+    yield from map(say.Sentence, differences(result))
+    yield from speed_table(result)
+
+
+def view(result: Reconstruction) -> View:
+    """The object; each press as measured and as the model with its one modulus answers the same path."""
+    model = result.model
+    shown = low_passed(model.presses).window(0.03, 0.03)
+    colourings, lines = usual_colourings(model), [Line("measured", local(shown, shown.force), "measured")]
+    selected = 0
+    if result.sites is not None and result.modulus is not None:
+        force = forces_at(
+            result.sites,
+            shown.displacement,
+            shown.starts,
+            young_modulus_pa=result.modulus.modulus_pa,
+            tip_radius_m=shown.tip_radius_m,
+            law=result.modulus.press.law,
+        )
+        lines.append(Line("model with one modulus", local(shown, force)))
+        each = rms_by_press(shown, force - shown.force)
+        words = (
+            "Model less measured, root mean square over each press, which the modulus was fitted to; between "
+            "presses what is near."
+        )
+        colourings.insert(1, Colouring(ERROR, None, each, words))
+        selected = int(np.argmax(each))
+    return view_of_presses(model, shown, colourings, lines, selected)
+
+
+def object_figure(model: Model) -> Figure:
+    """First touches and fixed base; the modulus of single presses over the surface."""
+    figure, axes = subplots(1, 2, figsize=(10, 4.2))
+    draw_touched(axes[0], model)
+    own = model.presses.fits["e_pa"]
+    if np.isfinite(own).any():
+        values = own[np.isfinite(own)] * MODULUS.scale
+        limits = MODULUS.limits(values.min(), values.max())
+        colours = Colours(over_surface(model, own * MODULUS.scale), MODULUS, limits)
+        draw_object(axes[1], model, colours, touches=model.presses.point[np.isfinite(own)])
+    else:
+        axes[1].set_axis_off()
+    return figure
+
+
+def next_steps(result: Reconstruction) -> list[str]:
+    """What to do with the model."""
+    where = file_words(result.model.path, "MODEL")
+    recording = file_words(result.exploration.recording.path, "REC")
+    return [
+        f"feel it: `palpate touch {where}`",
+        f"see what it leaves out: `palpate diagnose {recording} --model {where} --report PAGE.html`",
+    ]
+
+
+def lost(result: Reconstruction) -> str:
+    """That a 1D model predicts places better that were held out, and what may help, before what else is said;
+    '' where none does."""
+    told = result.held_out
+    if told is None or not told.beaten_by:
+        return ""
+    one = result.model.provenance["options"]["modulus_field"]["field"] == "homogeneous"
+    return (
+        f"{told.beaten_by}, a 1D model, errs by {mn(told.floor_n, '.2g')} on places that were held out and "
+        f"this model by {mn(told.model_n, '.2g')}{' (--field auto may help)' if one else ''}; "
+    )
+
+
+def meaning(result: Reconstruction) -> str:
+    """What the modulus and its interval mean, in a sentence or two."""
+    model = result.model
+    e, (low, high) = model.material.young_modulus_pa, model.material.young_modulus_ci95_pa
+    words = f"About as soft as {softness(e)}."
+    if np.isfinite([low, high]).all():
+        words += (
+            f" Another exploration of the same object would be expected to find a modulus within "
+            f"{100 * max(high / e - 1, 1 - low / e):.0f} % of this one."
+        )
+    if result.modulus:
+        misfit = float(np.sqrt((result.modulus.press.rms_n**2).mean()))
+        words += f" One number for the whole object leaves {mn(misfit)} of a press unexplained."
+    return words
+
+
+def least_known(surface: Surface) -> str:
+    """How well a shape is known, and where to press to know it better, in words; standard deviations."""
+    place, sd_m = surface.least_known
+    usual_m = float(np.median(surface.uncertainty_m[surface.above_base]))
+    return (
+        f"known within {mm(usual_m, '.2g')} (median), least at {place_mm(place)}, within {mm(sd_m, '.2g')}: "
+        "press there to know it better"
+    )
+
+
+def _how(result: Reconstruction) -> say.Story:
+    surface = result.surface
+    known = f" It is {least_known(surface)}." if surface.shape is None else ""
+    method = "The method takes the tip's size into account, where the paper presses with a point."
+    if paper_remade(result):
+        method = "The method is the paper's own."
+    yield say.Detail(
+        f"Shape: {surface.method}; {surface.reason}.{known} Volume {surface.volume_m3 * 1e6:.1f} cm³. The "
+        f"sensor's noise is {mn(result.exploration.noise_n, '.1f')} an axis. {method}"
+    )
+    if result.modulus:
+        fit = result.modulus
+        yield say.Sentence(
+            f"The modulus: {fit.reason}. From place to place it differs by "
+            f"{100 * fit.between:.1f} %; what is not known of the shape makes it uncertain by another "
+            f"{100 * fit.shape_error:.2f} %. Which law is best was asked again of places drawn at random; "
+            "the last column says how often it was each."
+        )
+        yield say.Rows(
+            ["dent law", "modulus [kPa]", "not explained of a press [mN]", "best in so many draws"],
+            [
+                [name, e / 1e3, f"{1e3 * misfit:.1f}", f"{100 * share:.0f} %"]
+                for name, (e, misfit, share) in fit.by_law.items()
+            ],
+        )
+
+
+def _not_used(result: Reconstruction) -> list[tuple[float, str]]:
+    return [*result.exploration.rejected, *(result.paper_fit.not_used if result.paper_fit else ())]
+
+
+def _mesh_words(result: Reconstruction) -> str:
+    report = result.meshing.report
+    within = 100 * np.mean(report.radius_edge_ratio <= 2)
+    return (
+        f"Quality of the {len(result.meshing.mesh.tetrahedra)} tetrahedra: {within:.1f} % within a "
+        f"radius-edge ratio of 2 (greatest {report.radius_edge_ratio.max():.2f}); greatest distance between "
+        f"mesh and surface {mm(report.surface_distance_m.max(), '.2f')}; volume "
+        f"{report.volume_m3 * 1e6:.1f} of {report.surface_volume_m3 * 1e6:.1f} cm³."
+    )
+
+
+def _surface(result: Reconstruction) -> dict[str, Any]:
+    where, sd_m = result.surface.least_known
+    return {**say.figures_of(result.surface, ("method", "reason", "volume_m3")),
+            "least_known_at_m": where, "least_known_sd_m": sd_m}  # fmt: skip
+
+
+def _mesh(result: Reconstruction) -> dict[str, Any]:
+    report = result.meshing.report
+    return {
+        "radius_edge_ratio": _percentiles(report.radius_edge_ratio),
+        "surface_distance_m": _percentiles(report.surface_distance_m),
+        "volume_m3": report.volume_m3,
+    }
+
+
+def _percentiles(values: np.ndarray) -> dict[str, float]:
+    return {name: float(np.percentile(values, at)) for name, at in (("p50", 50), ("p95", 95), ("max", 100))}
+
+
+def _held_out(result: Reconstruction) -> dict[str, Any]:
+    told = result.held_out
+    floor = told is not None and bool(told.floor)
+    return {
+        "held_out_rmse_n": told.model_n if told else None,
+        "held_out_constant_rmse_n": told.constant_n if told else None,
+        "held_out_floor": told.floor if told and floor else None,
+        "held_out_floor_rmse_n": told.floor_n if told and floor else None,
+        "beaten_by": (told.beaten_by or None) if told else None,
+    }
+
+
+_LAW = ("young_modulus_pa", "misfit_n", "share")
+_DEPTH = ("depth_m", "young_modulus_pa", "consistent")
+_FIT: tuple[say.Key, ...] = (
+    "dent_law=press.law",
+    ("by_law", lambda fit: {law: dict(zip(_LAW, row, strict=True)) for law, row in fit.by_law.items()}),
+    ("by_depth", lambda fit: [dict(zip(_DEPTH, row, strict=True)) for row in fit.by_depth]),
+    "between_sites=between",
+    "shape_error",
+)
+
+
+def _how_fitted(result: Reconstruction) -> dict[str, Any]:
+    found = say.figures_of(result.modulus, _FIT) if result.modulus else {}
+    if exact := result.exact:
+        by_table = {"young_modulus_by_table_pa": exact.by_table.modulus_pa}
+        found["exact"] = {**by_table, **exact.presses.as_json()}
+    if result.paper_fit:
+        found["not_used"] = _contacts(result.paper_fit.not_used)
+    return found
+
+
+def _contacts(rejected: Sequence[tuple[float, str]]) -> list[dict[str, Any]]:
+    return [{"t_s": t, "reason": reason} for t, reason in rejected]
+
+
+KEYS: tuple[say.Key, ...] = (
+    ("method", lambda result: result.model.provenance["method"]),
+    "young_modulus_pa=model.material.young_modulus_pa",
+    "young_modulus_ci95_pa=model.material.young_modulus_ci95_pa",
+    "poisson_ratio=model.material.poisson_ratio",
+    ("palpations", lambda result: len(result.exploration.presses)),
+    ("rejected", lambda result: _contacts(result.exploration.rejected)),
+    "findings",
+    "doubt",
+    _held_out,
+    "noise_n=exploration.noise_n",
+    "force_delay_s=exploration.delay_s",
+    "force_delay_sd_s=exploration.delay_error_s",
+    "dropped_corrections=exploration.dropped",
+    ("surface", _surface),
+    (
+        "geometry",
+        lambda result: {**result.placed.about, "notes": result.placed.notes} if result.placed else None,
+    ),
+    ("mesh", _mesh),
+    "press_modulus_pa",
+    "seconds",
+    _how_fitted,
+)

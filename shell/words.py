@@ -1,0 +1,112 @@
+"""How people read names, numbers and lists: the same words on a terminal, a page and in a message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+
+def spaced(name: str) -> str:
+    """A name of an effect or a key as people write it: 'time delay' of 'time_delay'."""
+    return name.replace("_", " ")
+
+
+def listed(words: Iterable[str], last: str = "and") -> str:
+    """'a', 'a and b', 'a, b and c'; '' of none. last: 'and' or 'or'."""
+    *first, end = list(words) or [""]
+    return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def spoken(names: Iterable[str], last: str = "and") -> str:
+    """Names of effects or keys as a list in a sentence."""
+    return listed(map(spaced, names), last)
+
+
+def begun(text: str) -> str:
+    """With a capital letter first."""
+    return text[:1].upper() + text[1:]
+
+
+def small(text: str) -> str:
+    """With a small letter first."""
+    return text[:1].lower() + text[1:]
+
+
+def ended(text: str) -> str:
+    """With a full stop, where nothing ends it."""
+    return text if text.endswith((".", "!", "?", ":")) else f"{text}."
+
+
+def sentence(text: str) -> str:
+    """A line as a whole sentence."""
+    return ended(begun(text))
+
+
+def counted(number: int, thing: str) -> str:
+    """'1 curve', '3 curves'."""
+    return f"{number} {thing}{'s' * (number != 1)}"
+
+
+def with_unit(value: float, unit: str, scale: float = 1.0, digits: int = 4) -> str:
+    """A number with its unit for people: `with_unit(0.0123, "mm", 1e3)` is '12.3 mm'."""
+    return f"{value * scale:.{digits}g} {unit}"
+
+
+def mm(metres: float, form: str = ".3g") -> str:
+    """A length in millimetres. form: of the number, as in a format string."""
+    return f"{1e3 * metres:{form}} mm"
+
+
+def mn(newtons: float, form: str = ".0f") -> str:
+    """A force in millinewtons."""
+    return f"{1e3 * newtons:{form}} mN"
+
+
+def kpa(pascals: float, form: str = ".2f") -> str:
+    """A modulus in kilopascals."""
+    return f"{pascals / 1e3:{form}} kPa"
+
+
+def sure(low: object, high: object) -> str:
+    """A 95 % interval, its ends as people read them."""
+    return f"95 % sure: {low} to {high}"
+
+
+def sure_kpa(ci95_pa: Sequence[float], form: str = ".2f") -> str:
+    """The 95 % interval of a modulus, Pa."""
+    low, high = ci95_pa
+    return sure(f"{low / 1e3:{form}}", kpa(high, form))
+
+
+def place_mm(point_m: Iterable[float]) -> str:
+    """A place, m, as '(12, -3, 80) mm'."""
+    return f"({', '.join(f'{1e3 * v:.0f}' for v in point_m)}) mm"
+
+
+def force_words(newtons: float) -> str:
+    """A force in millinewtons, in newtons from one on."""
+    return f"{newtons:.2f} N" if newtons >= 1 else mn(newtons)
+
+
+def percent(share: float, form: str = ".0f") -> str:
+    """A share as a percentage, which no line breaks."""
+    return f"{100 * share:{form}}\u00a0%"
+
+
+def between_words(low: float, high: float) -> str:
+    """An interval of shares: '85 to 91 %', with a decimal where its ends would be one number."""
+    digits = 0 if round(100 * low) != round(100 * high) else 1
+    return f"{100 * low:.{digits}f} to {100 * high:.{digits}f}\u00a0%"
+
+
+def chance_words(p: float) -> str:
+    """A p value as one would say it."""
+    if p < 0.0095:
+        return "less than once in 100"
+    return f"{100 * p:.0f} times in 100" if p < 0.995 else "always"
+
+
+def share_words(value: float | None) -> str:
+    """A share of the gap that is closed."""
+    if value is None:
+        return "-"
+    return percent(value) if value >= 0 else "none (worse)"

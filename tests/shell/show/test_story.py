@@ -1,0 +1,89 @@
+"""A story is said once: what a terminal, a page and JSON each print of it, and the words that all share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from palpate.show import story as say
+from palpate.show.page import Page
+from palpate.words import force_words, kpa, listed, mm, place_mm, sentence, spoken, sure_kpa
+
+
+def printed(*blocks: say.Told) -> str:
+    page = Page("a thing")
+    page.tell(blocks)
+    return page.html().partition("</h1>")[2].partition("<footer>")[0].replace("\n", "")
+
+
+def test_a_terminal_prints_lines_and_leaves_pages_alone():
+    def ran():
+        raise AssertionError("a terminal draws nothing")
+        yield
+
+    blocks = [
+        say.Title("of the page"),
+        say.Headline("it is 5\u00a0% off"),
+        say.Sentence("for a page", on=say.PAGE),
+        say.Sentence("for both"),
+        say.Detail("under it"),
+        say.Note("a reason"),
+        say.Rows(["  what", "N"], [["  a", 1.5], ["  b", 20]], (-8, 6), on=say.TEXT),
+        say.Rows(["what"], ran()),
+        say.Picture(ran, "a curve"),
+        say.Section("Evidence", ran()),
+        say.Next(["feel it: `palpate touch M`"]),
+    ]
+    told = ["it is 5 % off", "for both", "  under it", "  a reason"]
+    assert say.lines_of(blocks) == [*told, "  what       N", "  a        1.5", "  b         20"]
+    assert say.steps_of([*blocks, say.Next(ran(), on=say.PAGE)]) == ["feel it: `palpate touch M`"]
+
+
+def test_a_page_makes_sentences_and_leaves_the_terminals_lines_alone():
+    said = printed(
+        say.Title("another"),
+        say.Headline("silicone: 5 % off"),
+        say.Sentence("for a terminal", on=say.TEXT),
+        say.Sentence("it differs"),
+        say.Detail("k_V is as it is"),
+        say.Section("Why", [say.Note("a reason"), say.Rows(["what"], iter([["a <b>"]]))]),
+        say.Section("", [say.Markup("<hr>")]),
+    )
+    assert said.startswith('<p class="lead">silicone: 5 % off.</p><p>It differs.</p><p>k_V is as it is</p>')
+    assert "<h2>Why</h2><p>A reason.</p>" in said and "a &lt;b&gt;" in said and said.endswith("<hr>")
+    assert "terminal" not in said and "<h2></h2>" not in said
+
+
+@dataclass(frozen=True)
+class Inside:
+    length_m: float
+    counts: np.ndarray = field(metadata={"json": "counts_us"})
+
+
+@dataclass(frozen=True)
+class Held:
+    inside: Inside
+    names: tuple[str, ...]
+
+
+def test_json_is_printed_from_fields():
+    held = Held(Inside(float("nan"), np.arange(2)), ("a", "b"))
+    keys = ("names", "length_m=inside.length_m", ("n", lambda h: len(h.names)), lambda h: {"more": h.inside})
+    assert say.figures_of(held, keys) == {
+        "names": ["a", "b"], "length_m": None, "n": 2, "more": {"length_m": None, "counts_us": [0, 1]}
+    }  # fmt: skip
+    with pytest.raises(AttributeError):
+        say.figures_of(held, ("no_such_field",))
+
+
+def test_lists_names_and_quantities_read_as_one_says_them():
+    assert [listed("abc"[:n]) for n in range(4)] == ["", "a", "a and b", "a, b and c"]
+    assert spoken(["time_delay", "force_bias"], "or") == "time delay or force bias"
+    assert [sentence(t) for t in ("it is", "Is it?", "")] == ["It is.", "Is it?", "."]
+    assert (mm(0.0123), kpa(28.8e3), force_words(0.05), force_words(1.2)) == (
+        "12.3 mm", "28.80 kPa", "50 mN", "1.20 N"
+    )  # fmt: skip
+    assert sure_kpa((27e3, 30e3), ".1f") == "95 % sure: 27.0 to 30.0 kPa"
+    assert place_mm((0.01, -0.002, 0.08)) == "(10, -2, 80) mm"
