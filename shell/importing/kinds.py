@@ -1,71 +1,23 @@
-"""What is open is asked once, in plain words, on a terminal; elsewhere the line that names the flag ends the
-command.
-
-What `palpate open` made of a file.
-
-What a file is: a MODEL, a surface, a recording, a machine's curves, or a table of a robot's log.
+"""What a file is: a MODEL, a surface, a recording, a machine's curves, or a table of a robot's log; and what
+`palpate open` made of it.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from palpate.importing.formats.registry import TEXT_SUFFIXES
 from palpate.importing.machine_tests import is_chiaro, kind_of
 from palpate.importing.mapping import Said, find_columns
-from palpate.importing.meaning import Unclear
 from palpate.importing.tables import read_tables
 from palpate.mechanics.disk.reading import no_file
 from palpate.mechanics.disk.surface_files import is_surface_file
 from palpate.mechanics.errors import RecordingError
-from palpate.mechanics.names import pairs
 from palpate.mechanics.result import Result
-from palpate.operations._declare import Call
 from palpate.render.press import COLUMNS as PRESS_COLUMNS
-
-T = TypeVar("T")
-
-
-def with_answers(work: Callable[[Any, Call], T], asked: Any, call: Call) -> T:
-    """Do the work; where it is Unclear and a command runs on a terminal, ask and do it again.
-
-    Raises what the work raises.
-    """
-    while True:
-        try:
-            return work(asked, call)
-        except Unclear as unclear:
-            if call.out.destination == "-" or not (sys.stdin.isatty() and sys.stderr.isatty()):
-                raise
-            answer = _answer(unclear)
-            if unclear.option == "units":
-                kind, _, unit = answer.partition("=")
-                answer = {**dict(pairs(call.given.get("units"), "--units", "position=mm")), kind: unit}
-            asked = dataclasses.replace(asked, **{unclear.option: answer})
-            call = dataclasses.replace(call, given={**call.given, unclear.option: answer})
-
-
-def _answer(unclear: Unclear) -> Any:
-    """What is typed, until it is allowed; a number where there are no choices."""
-    allowed = f" ({' or '.join(unclear.choices)})" if unclear.choices else ""
-    while True:
-        print(f"{unclear.question}{allowed}? ", end="", file=sys.stderr, flush=True)
-        text = sys.stdin.readline()
-        if not text:
-            raise unclear
-        text = text.strip()
-        if text in unclear.choices:
-            return text
-        if not unclear.choices:
-            try:
-                return float(text)
-            except ValueError:
-                continue
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,42 +1,43 @@
-"""An operation, declared once: a function, the frozen dataclass of its operands, the options that it takes.
+"""An operation is its signature: flags, help, completion, the Python call and its checks are read from it.
 
-    @dataclass(frozen=True)
-    class StretchOperands:
-        model: ModelLike = operand(REQUIRED, "what is stretched", metavar="MODEL", positional=True)
-        _: KW_ONLY
-        by_m: float = operand(0.001, "how far", unit="m")
+    @operation(common="friction")
+    def stretch(
+        model: Annotated[ModelLike, argument("what is stretched", metavar="MODEL", reads=True)],
+        *,
+        by_m: Annotated[float, option("how far", unit="m")] = 0.001,
+        render: RenderOptions,
+        call: Call,
+    ) -> Curve: ...
 
-    @operation(StretchOperands, RenderOptions)
-    def stretch(asked: StretchOperands, call: Call) -> Curve: ...
-
-From the fields come the Python call's signature and docstring, `pp.options("stretch")`, and the flags and
-help of `palpate stretch` (`palpate.operations._to_argparse`).
+An options dataclass becomes a flag a field, and arrives made. From this come `pp.stretch(model, by_m=0.002)`,
+`pp.options("stretch")` and `palpate stretch MODEL --by 0.002` (`palpate.operations._to_argparse`). A module
+has `from __future__ import annotations`: types stay words, of which only what describes an operand is
+evaluated, so that a type may be imported under TYPE_CHECKING.
 """
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import functools
 import importlib
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import typing
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from palpate.mechanics.disk.writing import FolderKind, Kind, check_target
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import near, unknown
-from palpate.mechanics.options import option, span_of
-from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.options import span_of
+from palpate.operations._call import Call
 from palpate.operations._fields import Option, Options, check
 from palpate.operations._list import calls
-from palpate.output import Output, progress_bar
 
 T = TypeVar("T")
 R = TypeVar("R")
-REQUIRED: Any = ...
-"""In the place of a default, where an operand has none."""
+Field = dataclasses.Field[Any]
 STREAMS = ("-", "none")
 """In the place of a path: standard output, and no file at all."""
 GREATEST = 1e15
@@ -51,7 +52,7 @@ class OnCommandLine:
     nargs ("?", "+", "*", "..."), or "repeat" for a flag that may be given several times; parse: from text to
     the value; reads: names a file or folder that is read; writes: one that is written, its
     `mechanics.disk.writing.Kind`, or where that is as "module:NAME"; needed: on the command line, though it
-    has a default; only: "command" or "python" where it is one's alone; rare: `--help` leaves it to
+    has a default; only: "command" or "python" where it is one's alone; advanced: `--help` leaves it to
     `--help-all`.
     """
 
@@ -64,7 +65,7 @@ class OnCommandLine:
     writes: Kind | FolderKind | str | None = None
     needed: bool = False
     only: str = ""
-    rare: bool = False
+    advanced: bool = False
 
     def kind(self) -> Kind | FolderKind | None:
         """What is written; None for nothing."""
@@ -74,8 +75,7 @@ class OnCommandLine:
         return getattr(importlib.import_module(module), name)
 
 
-def operand(
-    default: Any,
+def option(
     help: str,
     *,
     unit: str = "",
@@ -84,109 +84,143 @@ def operand(
     low: float = -GREATEST,
     high: float = GREATEST,
     **written: Any,
-) -> Any:
-    """A field of an operands dataclass: `mechanics.options.option`, and its `OnCommandLine` by keyword."""
-    made = option(default, help, unit=unit, flag=flag, choices=choices, low=low, high=high)
-    metadata = {**made.metadata, "written": OnCommandLine(**written)}
-    if default is REQUIRED:
-        return dataclasses.field(metadata=metadata)
-    return dataclasses.field(default=default, metadata=metadata)
+) -> Mapping[str, Any]:
+    """What describes an operand in `Annotated[TYPE, option(...)]`, as `mechanics.options.option` describes a
+    field; its `OnCommandLine` by keyword."""
+    return {
+        "help": help, "unit": unit, "flag": flag, "choices": tuple(choices) if choices else None,
+        "low": low, "high": high, "written": OnCommandLine(**written),
+    }  # fmt: skip
 
 
-def written(field: dataclasses.Field[Any]) -> OnCommandLine:
+def argument(help: str, **more: Any) -> Mapping[str, Any]:
+    """As `option`, of what is written without a flag."""
+    return option(help, positional=True, **more)
+
+
+def written(field: Field) -> OnCommandLine:
     """How a field is written; that of an options dataclass is a flag with one value."""
     return field.metadata.get("written") or OnCommandLine()
 
 
-def declared(kind: Any) -> list[dataclasses.Field[Any]]:
-    """The fields of a dataclass that are options or operands."""
+def declared(kind: Any) -> list[Field]:
+    """The fields of an options dataclass that are flags."""
     return [f for f in dataclasses.fields(kind) if "help" in f.metadata]
 
 
+class Given(dict[str, Any], Generic[T]):
+    """As the type of an operand: an options dataclass of which only what was given arrives, by field."""
+
+
 @dataclass(frozen=True)
-class Call:
-    """One call of an operation. given: what was given, by name; wanted: whether or where progress goes;
-    out: what a command says on the way, silent in a Python call."""
+class EachOf:
+    """As what describes an operand: options dataclasses by name; they arrive made, by the same names."""
 
-    given: Mapping[str, Any]
-    wanted: bool | Progress = True
-    out: Output = dataclasses.field(default_factory=lambda: Output("-"))
+    kinds: Mapping[str, type]
 
-    def of(self, kind: type[T], **instead: Any) -> T:
-        """An options dataclass with what was given of it. instead: fields that are set here."""
-        return kind(**{**self.values(kind), **instead})
 
-    def values(self, kind: type) -> dict[str, Any]:
-        """What was given of an options dataclass, by field."""
-        return {f.name: self.given[f.name] for f in declared(kind) if f.name in self.given}
+def _nested(kind: type) -> dict[str, type]:
+    """The options dataclasses inside one, by field; its metadata may say that they are no flags."""
+    inside: dict[str, Any] = {
+        f.name: f.default_factory for f in dataclasses.fields(kind) if f.metadata.get("flags", True)
+    }
+    return {name: each for name, each in inside.items() if _is_options(each) and declared(each)}
 
-    @contextmanager
-    def progress(self, label: str) -> Iterator[Progress]:
-        """Where progress goes: to a callable, to a bar on a terminal, or nowhere."""
-        if callable(self.wanted):
-            yield self.wanted
-        elif self.wanted:
-            with progress_bar(label) as bar:
-                yield bar
-        else:
-            yield silent
+
+def _is_options(about: Any) -> bool:
+    return isinstance(about, type) and dataclasses.is_dataclass(about)
+
+
+def _made(kind: type, given: Mapping[str, Any]) -> Any:
+    """An options dataclass with what was given of it and of those inside it."""
+    inside = {name: _made(each, given) for name, each in _nested(kind).items()}
+    said = {f.name: given[f.name] for f in dataclasses.fields(kind) if f.name in given}
+    return kind(**{**said, **inside})
+
+
+@dataclass(frozen=True)
+class Group:
+    """An operand that is options. names: under which they arrive, one without a name as itself; bare: only
+    what was given arrives."""
+
+    names: Mapping[str, type]
+    bare: bool = False
+
+    @property
+    def kinds(self) -> list[type]:
+        """Every options dataclass, those inside of another after it."""
+        return [each for kind in self.names.values() for each in (kind, *_nested(kind).values())]
+
+    def arriving(self, given: Mapping[str, Any]) -> Any:
+        """What the function gets; raises OptionError for what a dataclass refuses."""
+        if self.bare:
+            return Given({f.name: given[f.name] for k in self.kinds for f in declared(k) if f.name in given})
+        made = {name: _made(kind, given) for name, kind in self.names.items()}
+        return made.get("", made)
 
 
 class Operation:
     """What was declared; every function made by `operation` has it as its attribute `operation`.
 
-    often: the options of `kinds` that `--help` shows; the others wait for `--help-all`. before: what the
-    command alone looks at before the work; answer: what it does with the result (`palpate.operations._run`);
-    None prints its lines, and writes JSON and files.
+    own: the operands that are described one by one, with their parameters; groups: those that are options;
+    fields: every operand and option by name; common: the options that `--help` shows; the others wait for
+    `--help-all`.
     """
 
     def __init__(
         self,
-        function: Callable[[Any, Call], Any],
-        operands: Any,
-        kinds: Sequence[type],
+        function: Callable[..., Any],
         *,
-        often: str | None,
-        before: Callable[[Any], None] | None,
-        answer: Callable[..., int] | None,
+        common: str | None,
         has_progress: bool,
         has_json: bool,
+        like: Callable[..., Any] | None,
     ) -> None:
-        self.name, self.function, self.operands = function.__name__, function, operands
-        self.own = {each.name for each in dataclasses.fields(operands)}
-        self.kinds, self.before, self.answer = tuple(kinds), before, answer
+        self.name, self.function = function.__name__, function
         self.has_progress, self.has_json = has_progress, has_json
-        self.fields: dict[str, dataclasses.Field[Any]] = {}
-        for kind in (operands, *kinds):
+        source = like.operation.function if like is not None else function  # type: ignore[attr-defined]
+        self.declaration = inspect.signature(source)
+        self.own: dict[str, inspect.Parameter] = {}
+        self.groups: dict[str, Group] = {}
+        self.takes_call = ""
+        self.fields: dict[str, Field] = {}
+        for name, parameter in self.declaration.parameters.items():
+            words, about = _read(parameter.annotation, source.__globals__)
+            if about is Call:
+                self.takes_call = name if like is None else ""
+            elif (group := _group(about)) is not None:
+                self.groups[name] = group
+            elif isinstance(about, Mapping):
+                self.own[name] = parameter
+                self.fields[name] = _field(parameter, words, about)
+            else:
+                raise TypeError(f"{self.name}: '{name}: {words}' is not described, nor options, nor the Call")
+        for kind in self.kinds:
             for each in declared(kind):
                 self.fields.setdefault(each.name, each)
-        self.often = set(self.fields) - self.own if often is None else set(often.split())
+        self.common = set(self.fields) - set(self.own) if common is None else set(common.split())
 
-    def is_often(self, field: dataclasses.Field[Any]) -> bool:
+    @property
+    def kinds(self) -> list[type]:
+        """The options dataclasses, in the order of help."""
+        return [kind for group in self.groups.values() for kind in group.kinds]
+
+    def is_common(self, field: Field) -> bool:
         """Whether `--help` shows it."""
-        return field.name in self.often or (field.name in self.own and not written(field).rare)
+        return field.name in self.common or (field.name in self.own and not written(field).advanced)
 
     def signature(self, result: Any) -> inspect.Signature:
         """That of the Python call: operands in their order, then every option by name."""
-        parameters = []
-        for field in self.fields.values():
-            if written(field).only == "command":
-                continue
-            own = field.name in self.own
-            kind: Any = inspect.Parameter.KEYWORD_ONLY
-            if own and not field.kw_only:
-                many = str(field.type).startswith("tuple")
-                kind = inspect.Parameter.VAR_POSITIONAL if many else inspect.Parameter.POSITIONAL_OR_KEYWORD
-            default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
-            if kind is inspect.Parameter.VAR_POSITIONAL:
-                default = inspect.Parameter.empty
-            parameters.append(inspect.Parameter(field.name, kind, default=default, annotation=field.type))
+        parameters = [
+            parameter.replace(annotation=self.fields[name].type)
+            for name, parameter in self.own.items()
+            if written(self.fields[name]).only != "command"
+        ]
+        more = [(f.name, f.default, f.type) for name, f in self.fields.items() if name not in self.own]
         if self.has_progress:
-            parameters.append(
-                inspect.Parameter(
-                    "progress", inspect.Parameter.KEYWORD_ONLY, default=True, annotation="bool | Progress"
-                )
-            )
+            more.append(("progress", True, "bool | Progress"))
+        named = inspect.Parameter.KEYWORD_ONLY
+        parameters += [inspect.Parameter(n, named, default=d, annotation=t) for n, d, t in more]
         return inspect.Signature(parameters, return_annotation=result)
 
     def documentation(self) -> str:
@@ -205,57 +239,95 @@ class Operation:
             if written(f).only != "command" and (meta := f.metadata)
         ]
 
-    def run(
-        self, given: Mapping[str, Any], wanted: bool | Progress = True, out: Output | None = None
-    ) -> tuple[Any, Any]:
-        """(operands, result) of what was given by name. out: of a command, None for a Python call.
+    def refuse(self, given: Mapping[str, Any]) -> None:
+        """Raise OptionError for a value of the wrong kind or not allowed."""
+        for name, value in given.items():
+            check(name, value, self.fields[name])
+
+    def arriving(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """What the function gets of what was given by name; raises OptionError."""
+        groups = {name: group.arriving(given) for name, group in self.groups.items()}
+        return {name: given[name] for name in self.own if name in given} | groups
+
+    def run(self, given: Mapping[str, Any], call: Call) -> Any:
+        """Do it with what was given by name.
 
         Raises OptionError for a value of the wrong kind or not allowed, FileError for what cannot be written.
         """
+        self.refuse(given)
         for name, value in given.items():
-            check(name, value, self.fields[name])
             kind = written(self.fields[name]).kind()
             if kind is not None and value is not None and str(value) not in STREAMS:
                 check_target(value, kind)
-        asked = self.operands(**{name: value for name, value in given.items() if name in self.own})
         importlib.import_module("palpate.show")  # lets every result say and draw itself
-        if out is None:
-            return asked, self.function(asked, Call(given, wanted))
-        if self.before is not None:
-            self.before(asked)
-        return asked, self.function(asked, Call(given, wanted, out))
+        arguments = self.arriving(given) | ({self.takes_call: call} if self.takes_call else {})
+        bound = inspect.BoundArguments(self.declaration, arguments)
+        return self.function(*bound.args, **bound.kwargs)
+
+
+def _read(annotation: Any, names: dict[str, Any]) -> tuple[str, Any]:
+    """(the words of a type, what describes it: of an Annotated type what stands beside it, else the type
+    itself; None where its name is not there). annotation: words, of which no more than that is evaluated."""
+    tree = ast.parse(annotation, mode="eval").body
+    if isinstance(tree, ast.Subscript) and ast.unparse(tree.value) == "Annotated":
+        assert isinstance(tree.slice, ast.Tuple)
+        kind, about = tree.slice.elts
+        return ast.unparse(kind), _evaluated(about, names)
+    found = None
+    try:
+        found = _evaluated(tree, names)
+    except NameError:
+        pass  # a type that is known to type checkers alone
+    if typing.get_origin(found) is typing.Annotated:
+        kind, about = typing.get_args(found)
+        words = getattr(kind, "__forward_arg__", None) or getattr(kind, "__name__", None) or str(kind)
+        return words, about
+    return ast.unparse(tree), found
+
+
+def _evaluated(tree: ast.expr, names: dict[str, Any]) -> Any:
+    return eval(compile(ast.Expression(tree), "<signature>", "eval"), names)
+
+
+def _group(about: Any) -> Group | None:
+    """The options that an operand is; None for one value."""
+    if isinstance(about, EachOf):
+        return Group(about.kinds)
+    if typing.get_origin(about) is Given:
+        return Group({"": typing.get_args(about)[0]}, bare=True)
+    return Group({"": about}) if _is_options(about) else None
+
+
+def _field(parameter: inspect.Parameter, words: str, about: Mapping[str, Any]) -> Field:
+    """An operand as a field, as options have them."""
+    many = parameter.kind is parameter.VAR_POSITIONAL
+    needed = parameter.default is parameter.empty
+    default: Any = () if many else dataclasses.MISSING if needed else parameter.default
+    made: Field = dataclasses.field(default=default, metadata=about)
+    made.name, made.type = parameter.name, f"tuple[{words}, ...]" if many else words
+    return made
 
 
 def operation(
-    operands: type,
-    *kinds: type,
-    often: str | None = None,
-    before: Callable[[Any], None] | None = None,
-    answer: Callable[..., int] | None = None,
+    *,
+    common: str | None = None,
     progress: bool = True,
     json: bool = True,
-) -> Callable[[Callable[[Any, Call], R]], Callable[..., R]]:
-    """Make a function of (operands, Call) an operation. kinds: the options dataclasses that it takes too;
-    often: names of those of their options that most people use, with blanks; None: all."""
+    like: Callable[..., Any] | None = None,
+) -> Callable[[Callable[..., R]], Callable[..., R]]:
+    """Make a function an operation. common: the options, with blanks, that most people use, None: all;
+    progress: whether it tells of its progress; json: whether its command has --json; like: another operation,
+    whose signature it has."""
 
-    def made(function: Callable[[Any, Call], R]) -> Callable[..., R]:
-        this = Operation(
-            function,
-            operands,
-            kinds,
-            often=often,
-            before=before,
-            answer=answer,
-            has_progress=progress,
-            has_json=json,
-        )
+    def made(function: Callable[..., R]) -> Callable[..., R]:
+        this = Operation(function, common=common, has_progress=progress, has_json=json, like=like)
         signature = this.signature(function.__annotations__.get("return"))
 
         @functools.wraps(function)
         def called(*positional: Any, **named: Any) -> R:
             known(this.name, named, signature.parameters)
             given = signature.bind(*positional, **named).arguments
-            return this.run(given, given.pop("progress", True))[1]
+            return this.run(given, Call(given.pop("progress", True)))
 
         public: Any = called
         public.__signature__, public.__doc__, public.operation = signature, this.documentation(), this
@@ -288,10 +360,8 @@ def check_options(name: str, given: Mapping[str, Any]) -> None:
     """Raise OptionError for what an operation would refuse, before any work."""
     this = operation_of(name)
     known(name, given, this.fields)
-    for each, value in given.items():
-        check(each, value, this.fields[each])
-    for kind in this.kinds:
-        Call(given).of(kind)  # which refuses names that it does not know
+    this.refuse(given)
+    this.arriving(given)  # whose options refuse names that they do not know
 
 
 def options(function: str) -> Options:

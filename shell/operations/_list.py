@@ -28,9 +28,7 @@ OPERATIONS = {
         "whatever it is: understood, checked, reconstructed or measured", "open", "palpate.operations.open_"
     ),
     "import": Entry(
-        "other programs' files become a recording",
-        "import_table read_table",
-        "palpate.operations.import_",
+        "other programs' files become a recording", "import_table read_table", "palpate.operations.import_"
     ),
     "export": Entry("a MODEL as a page to be pressed, for MuJoCo, SOFA, Abaqus, Gmsh, or STL", "export"),
     "material": Entry("the material of a specimen from a machine's curves", "material"),

@@ -1,4 +1,4 @@
-"""What runs every command: parse, look at the paths, do it, say it, write it."""
+"""What runs every command: parse, look at the paths, do it, ask what is unclear."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ import argparse
 import contextlib
 import importlib
 import os
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from palpate.mechanics.disk.scratch import sweep_scratch
 from palpate.mechanics.disk.writing import FolderKind, Kind, check_target, written_at
-from palpate.mechanics.errors import OptionError, PalpateError
+from palpate.mechanics.errors import OptionError, PalpateError, RecordingError
+from palpate.mechanics.names import pairs
+from palpate.operations._call import Call
 from palpate.operations._declare import STREAMS, Operation
 from palpate.operations._list import OPERATIONS, module_of
 from palpate.operations._to_argparse import OneLineParser, add_operation
@@ -42,46 +45,45 @@ def run_command(name: str, words: Sequence[str], parser: argparse.ArgumentParser
     given = vars(arguments)
     out = Output(given.pop("json", None))
     operation, _ = command_operation(name)
-    asked, result = operation.run(given, out=out)
-    return (operation.answer or answer)(result, asked, out)
+    while True:
+        call = Call(command=True, out=out)
+        try:
+            return call.answer(operation.run(given, call))
+        except RecordingError as error:
+            given = _answered(error, given, operation, out)
 
 
-def answer(
-    result: Any,
-    asked: Any,
-    out: Output,
-    *,
-    lines: Sequence[str] = (),
-    figures: Mapping[str, Any] | None = None,
-) -> int:
-    """Say a result's lines, save and report it where that was asked for, write its JSON; exit code 0.
+def _answered(error: RecordingError, given: Mapping[str, Any], operation: Operation, out: Output) -> Any:
+    """What was given, with the answer of a person at a terminal to what is unclear; raises the error where
+    nothing can be asked."""
+    from palpate.importing.meaning import Unclear
 
-    lines: more to say; figures: what goes before the result's own JSON.
-    """
-    out.say(*result.lines(), *lines)
-    output, page = getattr(asked, "output", None), getattr(asked, "report", None)
-    if output is not None:
-        result.save(output)
-        out.say(f"written: {output}")
-    if page is not None:
-        out.say(report_words(result.report(page)))
-    say_next(result, out)
-    out.json({**(figures or {}), **result.as_json()})
-    return 0
+    terminal = out.destination != "-" and sys.stdin.isatty() and sys.stderr.isatty()
+    if not (isinstance(error, Unclear) and error.option in operation.fields and terminal):
+        raise error
+    answer = _typed(error)
+    if error.option == "units":
+        kind, _, unit = answer.partition("=")
+        answer = {**dict(pairs(given.get("units"), "--units", "position=mm")), kind: unit}
+    return {**given, error.option: answer}
 
 
-def report_words(page: Path) -> str:
-    """Where a page is; and the folder beside it, where its pictures were written as files too."""
-    folder = page.with_suffix("")
-    also = f" (its pictures as files too: {folder}{os.sep})" if any(folder.glob("*.png")) else ""
-    return f"report: {page}{also}"
-
-
-def say_next(result: Any, out: Output, **more: Any) -> None:
-    """Say what to do with a result. more: what its kind's `next_steps` takes beside."""
-    from palpate.show import next_lines
-
-    out.say(*next_lines(result, **more))
+def _typed(unclear: Any) -> Any:
+    """What is typed, until it is allowed; a number where there are no choices."""
+    allowed = f" ({' or '.join(unclear.choices)})" if unclear.choices else ""
+    while True:
+        print(f"{unclear.question}{allowed}? ", end="", file=sys.stderr, flush=True)
+        text = sys.stdin.readline()
+        if not text:
+            raise unclear
+        text = text.strip()
+        if text in unclear.choices:
+            return text
+        if not unclear.choices:
+            try:
+                return float(text)
+            except ValueError:
+                continue
 
 
 def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:

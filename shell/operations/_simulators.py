@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import pairs, words_of
-from palpate.operations._declare import operand
-from palpate.render.options import DOCUMENTED, SETTINGS, RenderOptions
+from palpate.operations._declare import option
+from palpate.render.options import SETTINGS, RenderOptions
 from palpate.render.registry import create, simulator_names
 
 if TYPE_CHECKING:
@@ -23,20 +24,25 @@ if TYPE_CHECKING:
     from palpate.render.simulators.base import Adapter, SimulatorRenderer
 
 
-def simulator_operand(words: str) -> Any:
+SettingsOfSimulator = Annotated[
+    str,
+    option(
+        "of --renderer: as its own documentation says, or as good as it gets", choices=SETTINGS, advanced=True
+    ),
+]
+NumbersOfSimulator = Annotated[
+    str,
+    option(
+        "numbers of these settings to change: KEY=VALUE, comma separated",
+        metavar="KEY=VALUE,...",
+        advanced=True,
+    ),
+]
+
+
+def simulator_option(words: str) -> Mapping[str, Any]:
     """--renderer NAME, of the other simulators alone."""
-    return operand(None, words, choices=simulator_names())
-
-
-def settings_operand() -> Any:
-    """--simulator-settings, of --renderer."""
-    words = "of --renderer: as its own documentation says, or as good as it gets"
-    return operand(DOCUMENTED, words, choices=SETTINGS, rare=True)
-
-
-def numbers_operand(words: str = "numbers of these settings to change", default: str | None = "") -> Any:
-    """KEY=VALUE,... of a simulator's settings."""
-    return operand(default, f"{words}: KEY=VALUE, comma separated", metavar="KEY=VALUE,...", rare=True)
+    return option(words, choices=simulator_names())
 
 
 TOLD_FROM, LONG_S = 0.01, 60.0
@@ -63,7 +69,7 @@ class Ran(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def mended(settings: str, numbers: str, by: str) -> tuple[str, str]:
+def mended_by(settings: str, numbers: str, by: str) -> tuple[str, str]:
     """(settings, numbers) with what mends them on top: one of SETTINGS, KEY=VALUE words, or both."""
     words = words_of(by)
     named = [word for word in words if word in SETTINGS]

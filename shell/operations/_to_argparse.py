@@ -81,23 +81,23 @@ class OneLineParser(argparse.ArgumentParser):
             choices = [str(each) for each in action.choices]
             raise argparse.ArgumentError(action, unknown(str(value), "choice", choices))
 
-    def rare(self) -> list[argparse.Action]:
+    def advanced(self) -> list[argparse.Action]:
         """What `--help` does not show."""
-        return [action for action in self._actions if getattr(action, "rare", False)]
+        return [action for action in self._actions if getattr(action, "advanced", False)]
 
     def format_help(self) -> str:
         """What most people use, and how many options there are beside it."""
-        rare = {action: action.help for action in self.rare()}
-        if not rare:
+        advanced = {action: action.help for action in self.advanced()}
+        if not advanced:
             return super().format_help()
-        for action in rare:
+        for action in advanced:
             action.help = argparse.SUPPRESS
         try:
             text = super().format_help()
         finally:
-            for action, words in rare.items():
+            for action, words in advanced.items():
                 action.help = words
-        return f"{text}\n{len(rare)} more options: {self.prog} --help-all\n"
+        return f"{text}\n{len(advanced)} more options: {self.prog} --help-all\n"
 
     def format_all_help(self) -> str:
         """Every option."""
@@ -119,13 +119,13 @@ def add_operation(parser: argparse.ArgumentParser, operation: Operation) -> None
     """Add every operand and option; what is not given is left out of the namespace."""
     for name, field in operation.fields.items():
         if name in operation.own and written(field).only != "python":
-            _add(parser, field, operation.is_often(field))
+            _add(parser, field, operation.is_common(field))
     for kind in operation.kinds:
         group = parser.add_argument_group(_title(kind))
         for field in declared(kind):
             if operation.fields[field.name] is field:
-                _add(group, field, operation.is_often(field))
-    if any(getattr(action, "rare", False) for action in parser._actions):
+                _add(group, field, operation.is_common(field))
+    if any(getattr(action, "advanced", False) for action in parser._actions):
         parser.add_argument("--help-all", action=_AllHelp, help="show every option, and leave")
     if operation.has_json:
         action = parser.add_argument(
@@ -141,7 +141,7 @@ def _title(kind: type) -> str:
     return getattr(kind, "title", kind.__name__.removesuffix("Options").lower() + " options")
 
 
-def _add(parser: Any, field: dataclasses.Field[Any], often: bool) -> None:
+def _add(parser: Any, field: dataclasses.Field[Any], common: bool) -> None:
     meta, how, types = field.metadata, written(field), type_words(field) - {"None"}
     name = next((word for word in ("bool", "int", "float") if word in types), "str")
     required = field.default is dataclasses.MISSING or how.needed
@@ -171,7 +171,7 @@ def _add(parser: Any, field: dataclasses.Field[Any], often: bool) -> None:
     else:
         flags = [how.short] * bool(how.short) + [flag_of(field)]
         action = parser.add_argument(*flags, dest=field.name, required=required, **keywords)
-    action.on_command_line, action.rare = how, not often
+    action.on_command_line, action.advanced = how, not common
 
 
 def _parser(field: dataclasses.Field[Any], how: OnCommandLine, name: str) -> Callable[[str], Any]:

@@ -5,34 +5,21 @@ They lie in the folder `benchmarks` of a clone of the project and are found from
 
 from __future__ import annotations
 
-import argparse
 import importlib
 import pkgutil
 import sys
-from dataclasses import KW_ONLY, dataclass
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import unknown
-from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._call import Call
+from palpate.operations._declare import argument, operation
 from palpate.operations._to_argparse import OneLineParser
-from palpate.output import Output, emit_json
+from palpate.output import emit_json
 
 _HELPERS = ("evidence", "timing")
-
-
-@dataclass(frozen=True)
-class BenchOperands:
-    """Which, and what it takes."""
-
-    name: str = operand(
-        REQUIRED, "which; without a known name the error lists them", metavar="name", positional=True
-    )
-    _: KW_ONLY
-    rest: list[str] = operand(
-        (), "the benchmark's own options (NAME --help)", metavar="...", positional=True, count="..."
-    )
 
 
 def clone() -> Path:
@@ -53,20 +40,12 @@ def names() -> list[str]:
     return sorted(n.replace("_", "-") for n in found if n not in _HELPERS and not n.startswith("_"))
 
 
-def _answer(run: Any, asked: BenchOperands, out: Output) -> int:
-    own, figures = run(out.destination)
-    emit_json(figures, own.json)
-    if own.evidence:
-        _keep(own.evidence, asked, figures.get("figures", ()))
-    return 0
-
-
-def _keep(path: str, asked: BenchOperands, figures: Any) -> None:
+def _keep(path: str, name: str, options: Sequence[str], figures: Any) -> None:
     """Write the figures with command, commit, date and processor."""
     evidence = importlib.import_module("benchmarks.evidence")  # it lies in the clone, not in the product
     if not figures:
-        raise OptionError(f"--evidence: 'palpate bench {asked.name}' gives no figures to keep")
-    words = ["palpate", "bench", asked.name, *_deciding(list(asked.rest))]
+        raise OptionError(f"--evidence: 'palpate bench {name}' gives no figures to keep")
+    words = ["palpate", "bench", name, *_deciding(options)]
     kept = evidence.write(path, evidence.measured(" ".join(words), figures, clone()))
     print(f"kept: {kept}", file=sys.stderr)
 
@@ -74,7 +53,7 @@ def _keep(path: str, asked: BenchOperands, figures: Any) -> None:
 _PLACES = ("--evidence", "--json", "--work", "--data", "--python", "--page")
 
 
-def _deciding(words: list[str]) -> list[str]:
+def _deciding(words: Sequence[str]) -> list[str]:
     """The options that decide what was measured, without those that say where on a machine things lie."""
     kept: list[str] = []
     left_out = False
@@ -90,26 +69,34 @@ def _deciding(words: list[str]) -> list[str]:
     return kept
 
 
-@operation(BenchOperands, answer=_answer, progress=False)
-def bench(asked: BenchOperands, call: Call) -> Any:
-    """Find one benchmark; what is returned runs it. Raises OptionError for one that is not there."""
-    if asked.name not in names():
-        raise OptionError(unknown(asked.name, "benchmark", names()))
+@operation(progress=False)
+def bench(
+    name: Annotated[str, argument("which; without a known name the error lists them", metavar="name")],
+    rest: Annotated[
+        Sequence[str], argument("the benchmark's own options (NAME --help)", metavar="...", count="...")
+    ] = (),
+    *,
+    call: Call,
+) -> None:
+    """Run one benchmark, and write its figures. Raises OptionError for one that is not there."""
+    if name not in names():
+        raise OptionError(unknown(name, "benchmark", names()))
     sys.path.insert(0, str(clone()))
-    module = importlib.import_module(f"benchmarks.{asked.name.replace('-', '_')}")
-
-    def run(destination: str | None) -> tuple[argparse.Namespace, Any]:
-        parser = OneLineParser(prog=f"palpate bench {asked.name}", description=module.__doc__)
-        module.add_arguments(parser)
-        parser.add_argument("--json", metavar="PATH", default=destination, help="write the figures as JSON")
-        parser.add_argument(
-            "--evidence",
-            metavar="PATH",
-            nargs="?",
-            const=str(clone() / "docs" / "evidence" / f"{asked.name}.json"),
-            help="keep figures, command, commit, date and processor (default: docs/evidence/NAME.json)",
-        )
-        own = parser.parse_args(asked.rest)
-        return own, module.run(own)
-
-    return run
+    module = importlib.import_module(f"benchmarks.{name.replace('-', '_')}")
+    parser = OneLineParser(prog=f"palpate bench {name}", description=module.__doc__)
+    module.add_arguments(parser)
+    parser.add_argument(
+        "--json", metavar="PATH", default=call.out.destination, help="write the figures as JSON"
+    )
+    parser.add_argument(
+        "--evidence",
+        metavar="PATH",
+        nargs="?",
+        const=str(clone() / "docs" / "evidence" / f"{name}.json"),
+        help="keep figures, command, commit, date and processor (default: docs/evidence/NAME.json)",
+    )
+    own = parser.parse_args(rest)
+    figures = module.run(own)
+    emit_json(figures, own.json)
+    if own.evidence:
+        _keep(own.evidence, name, rest, figures.get("figures", ()))

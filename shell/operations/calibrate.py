@@ -7,60 +7,52 @@ geometry is traced, or given by --slab, --half-space or --shape. TOOL.toml is wh
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from palpate.mechanics.errors import OptionError
-from palpate.operations._declare import Call, operand, operation
-from palpate.operations._run import answer
-from palpate.operations._shared import poisson_operand, recording_operand, save_operand, seed_operand
+from palpate.operations._call import Call
+from palpate.operations._declare import Given, operation, option
+from palpate.operations._shared import RecordingArgument, Seed, save_option
 from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
-from palpate.output import Output
 from palpate.reconstruction.geometry.stated import GeometryOptions
 
 if TYPE_CHECKING:
     from palpate.mechanics.recording.calibration import Calibration
-    from palpate.operations._shared import RecordingLike
 
 
-@dataclass(frozen=True)
-class CalibrateOperands:
-    """What was pressed, and what is to be trusted."""
-
-    recording: RecordingLike = recording_operand()
-    _: KW_ONLY
-    save: str | Path | None = save_operand(
-        "calibration to write, which recordings may name",
-        "TOOL.toml",
-        "palpate.mechanics.recording.calibration:TOOL",
-    )
-    rigid: bool = operand(False, "the presses are on a rigid plate")
-    modulus_pa: float | None = operand(
-        None,
-        "they are on an object of this Young's modulus, traced, or of a geometry that is given",
-        unit="Pa",
-    )
-    poisson_ratio: float | None = poisson_operand("of the object; None: 0.49")
-    trust: str = operand(
-        "tip",
-        "right where a common factor is left: the tip's radius or the sensor's gain",
-        choices=("tip", "gain"),
-    )
-    seed: int = seed_operand()
-
-
-def _answer(result: Calibration, asked: CalibrateOperands, out: Output) -> int:
-    lines = ["next: keep it for recordings: --save TOOL.toml"]
-    if asked.save is not None:
-        key = f'under [tool] in a recording\'s .toml: calibration = "{asked.save}"'
-        lines = [f"written: {asked.save}", f"next: let recordings be read by it, {key}"]
-    return answer(result, asked, out, lines=lines)
-
-
-@operation(CalibrateOperands, GeometryOptions, often="shape slab_m unit", answer=_answer)
-def calibrate(asked: CalibrateOperands, call: Call) -> Calibration:
+@operation(common="shape slab_m unit")
+def calibrate(
+    recording: RecordingArgument,
+    *,
+    save: Annotated[
+        str | Path | None,
+        save_option(
+            "calibration to write, which recordings may name",
+            "TOOL.toml",
+            "palpate.mechanics.recording.calibration:TOOL",
+        ),
+    ] = None,
+    rigid: Annotated[bool, option("the presses are on a rigid plate")] = False,
+    modulus_pa: Annotated[
+        float | None,
+        option(
+            "they are on an object of this Young's modulus, traced, or of a geometry that is given", unit="Pa"
+        ),
+    ] = None,
+    poisson_ratio: Annotated[float | None, option("of the object; None: 0.49")] = None,
+    trust: Annotated[
+        str,
+        option(
+            "right where a common factor is left: the tip's radius or the sensor's gain",
+            choices=("tip", "gain"),
+        ),
+    ] = "tip",
+    seed: Seed = 0,
+    geometry: Given[GeometryOptions],
+    call: Call,
+) -> Calibration:
     """The instrument, from presses on something known: tool's stiffness, sensor, bias, delay, play.
 
     Lengths m, moduli Pa. Raises OptionError unless one of rigid and modulus_pa is given, ContactError or
@@ -71,29 +63,33 @@ def calibrate(asked: CalibrateOperands, call: Call) -> Calibration:
     from palpate.reconstruction.geometry.stated import nowhere
     from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
-    if asked.rigid == (asked.modulus_pa is not None):
+    if rigid == (modulus_pa is not None):
         raise OptionError(
             "say on what it was pressed: rigid (--rigid), or modulus_pa (--modulus PA), one of them"
         )
-    if asked.modulus_pa is not None and not asked.modulus_pa > 0:
-        raise OptionError(f"modulus_pa is {asked.modulus_pa}; it must be greater than 0 Pa")
-    measured = read_recording(asked.recording)
+    if modulus_pa is not None and not modulus_pa > 0:
+        raise OptionError(f"modulus_pa is {modulus_pa}; it must be greater than 0 Pa")
+    measured = read_recording(recording)
     with call.progress("calibrate") as tell:
-        if asked.modulus_pa is None:
+        if modulus_pa is None:
             found = explore(measured, boundary=nowhere(measured), unbroken=True)
             result = calibrate_on_plate(found)
         else:
             made = reconstruct(
                 measured,
-                poisson_ratio=asked.poisson_ratio,
-                seed=asked.seed,
+                poisson_ratio=poisson_ratio,
+                seed=seed,
                 progress=lambda s, x: tell(s, 0.3 * x),
-                **call.values(GeometryOptions),
+                **geometry,
             )
             result = calibrate_on_object(
-                measured, made.model, asked.modulus_pa, trust=asked.trust, seed=asked.seed,
+                measured, made.model, modulus_pa, trust=trust, seed=seed,
                 progress=lambda s, x: tell(s, 0.3 + 0.7 * x),
             )  # fmt: skip
-    if asked.save is not None:
-        result.save(asked.save)
+    if save is None:
+        call.then("next: keep it for recordings: --save TOOL.toml")
+    else:
+        result.save(save)
+        key = f'under [tool] in a recording\'s .toml: calibration = "{save}"'
+        call.then(f"written: {save}", f"next: let recordings be read by it, {key}")
     return result

@@ -10,34 +10,21 @@ The shell then asks the program itself (argcomplete), so that what it offers is 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from typing import Annotated
 
-from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._declare import argument, operation
 from palpate.operations._list import commands
 from palpate.operations._to_argparse import add_operation
-from palpate.output import Output
 
 SHELLS = ("bash", "zsh", "fish")
 
 
-@dataclass(frozen=True)
-class CompletionOperands:
-    """Which shell."""
-
-    shell: str = operand(REQUIRED, "whose script is printed", choices=SHELLS, positional=True)
-
-
-def _answer(script: str, asked: CompletionOperands, out: Output) -> int:
-    print(script)
-    return 0
-
-
-@operation(CompletionOperands, answer=_answer, progress=False, json=False)
-def completion(asked: CompletionOperands, call: Call) -> str:
+@operation(progress=False, json=False)
+def completion(shell: Annotated[str, argument("whose script is printed", choices=SHELLS)]) -> str:
     """The script of one shell."""
     import argcomplete
 
-    return argcomplete.shellcode(["palpate"], shell=asked.shell)
+    return argcomplete.shellcode(["palpate"], shell=shell)
 
 
 def complete(line: str) -> None:

@@ -9,73 +9,58 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
+from typing import Annotated
 
 from palpate.demo import DemoOptions, DemoResult, run_demo
 from palpate.mechanics.disk.writing import check_target, sole_writer
 from palpate.mechanics.model.files import MODEL
-from palpate.operations._declare import Call, operand, operation
-from palpate.operations._shared import recording_operand, seed_operand
-from palpate.output import Output
+from palpate.operations._call import Call
+from palpate.operations._declare import argument, operation, option
+from palpate.operations._shared import Seed
 
 MEANWHILE = "what this makes is there to be touched already: 'palpate touch' in another terminal"
 
 
-@dataclass(frozen=True)
-class DemoOperands:
-    """Where from, where to."""
-
-    recording: str | None = recording_operand(
-        None, "a recording; None: the embedded silicone cylinder", count="?"
-    )
-    _: KW_ONLY
-    folder: str = operand(
-        "palpate-demo", "folder for model and report", flag="--output", short="-o", metavar="FOLDER"
-    )
-    window: bool | None = operand(
-        None, "open the touch window at the end; None: where there is a screen and a terminal"
-    )
-    seed: int = seed_operand()
-
-
-def _answer(found: tuple[DemoResult, Path], asked: DemoOperands, out: Output) -> int:
-    from palpate.show import next_lines
-
-    result, report = found
-    at = Path(asked.folder) / "model"
-    out.say(
-        *result.lines(),
-        f"report: {report.resolve()}",
-        *next_lines(result),
-    )
-    out.json({**result.as_json(), "report": str(report.resolve())})
-    if asked.window or (asked.window is None and _has_screen()):
-        from palpate.operations._run import run_command
-
-        return run_command("touch", [str(at), "--device", "mouse"])
-    return 0
-
-
-@operation(DemoOperands, DemoOptions, often="seconds renderer diagnosis fast", answer=_answer, progress=False)
-def demo(asked: DemoOperands, call: Call) -> tuple[DemoResult, Path]:
-    """Do all of it, and write the report; what was found, and where it is written."""
+@operation(common="seconds renderer diagnosis fast", progress=False)
+def demo(
+    recording: Annotated[
+        str | None,
+        argument("a recording; None: the embedded silicone cylinder", metavar="REC", reads=True, count="?"),
+    ] = None,
+    *,
+    folder: Annotated[
+        str, option("folder for model and report", flag="--output", short="-o", metavar="FOLDER")
+    ] = "palpate-demo",
+    window: Annotated[
+        bool | None, option("open the touch window at the end; None: where there is a screen and a terminal")
+    ] = None,
+    seed: Seed = 0,
+    options: DemoOptions,
+    call: Call,
+) -> DemoResult:
+    """Do all of it, and write the report."""
+    from palpate.operations._run import run_command
     from palpate.scenes.build import keep
     from palpate.scenes.embedded import embedded_recording
     from palpate.scenes.scene import FOLDER, read_scene
 
-    folder = Path(asked.folder)
-    check_target(folder / "model", MODEL)
-    if not asked.recording and sys.stderr.isatty():  # as a bar is shown: elsewhere errors alone stand there
+    into = Path(folder)
+    check_target(into / "model", MODEL)
+    if not recording and sys.stderr.isatty():  # as a bar is shown: elsewhere errors alone stand there
         print(MEANWHILE, file=sys.stderr)
-    with sole_writer(folder):
-        source = asked.recording or embedded_recording()
-        result = run_demo(source, folder, call.of(DemoOptions), asked.seed)
-        report = result.report(folder / "report.html")
-        if not asked.recording:
+    with sole_writer(into):
+        source = recording or embedded_recording()
+        result = run_demo(source, into, options, seed)
+        report = result.report(into / "report.html").resolve()
+        if not recording:
             # 'palpate touch' opens at once; by its file, as a folder of that name would go before it
-            keep(read_scene(FOLDER / "demo.toml"), folder / "model")
-    return result, report
+            keep(read_scene(FOLDER / "demo.toml"), into / "model")
+    call.then(f"report: {report}")
+    call.figures = {"report": str(report)}
+    if window or (window is None and _has_screen()):
+        call.exit_code = lambda: run_command("touch", [str(into / "model"), "--device", "mouse"])
+    return result
 
 
 def _has_screen() -> bool:

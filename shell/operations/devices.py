@@ -3,57 +3,66 @@
 from __future__ import annotations
 
 import time
-from dataclasses import KW_ONLY, dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from palpate.devices.base import Availability, DeviceSpec
 from palpate.devices.io_thread import Rate, ThreadedDevice
 from palpate.devices.registry import DEVICES, find_devices, make_device, options_of
 from palpate.mechanics.errors import OptionError
-from palpate.operations._declare import Call, operand, operation
-from palpate.output import Output
+from palpate.operations._declare import EachOf, argument, operation, option
 
 HARDWARE = ("spacemouse", "pid-ffb", "haply", "forcedimension", "openhaptics")
 LEAST_MEASURE_S = 1.0
 
 
 @dataclass(frozen=True)
-class DevicesOperands:
-    """Which, and whether they are measured."""
+class Found:
+    """Devices, each with its rate where that was measured."""
 
-    names: list[str] = operand(
-        (), f"only these (all by default): {', '.join(DEVICES)}", metavar="NAME", positional=True, count="*"
-    )
-    _: KW_ONLY
-    measure: float | None = operand(
-        None, "open the hardware that is there, force off, and measure its rate for this long", unit="s"
-    )
+    devices: Sequence[tuple[Availability, Rate | None]]
+
+    def lines(self) -> list[str]:
+        """For a person."""
+        there = [(device, rate) for device, rate in self.devices if device.present]
+        absent = [device for device, _ in self.devices if not device.present]
+        lines = (
+            ["there:", *(line for device, rate in there for line in _present(device, rate))] if there else []
+        )
+        lines += ["not there:", *(line for device in absent for line in _absent(device))] if absent else []
+        if there:
+            first = there[0][0].spec.name
+            lines += ["", f"to touch something with one: palpate touch --device {first}"]
+        return lines
+
+    def as_json(self) -> dict[str, Any]:
+        """Keys with units."""
+        return {"devices": [figures(device, rate) for device, rate in self.devices]}
 
 
-def _answer(found: list[tuple[Availability, Rate | None]], asked: DevicesOperands, out: Output) -> int:
-    there = [(device, rate) for device, rate in found if device.present]
-    if there:
-        out.say("there:", *(line for device, rate in there for line in _present(device, rate)))
-    if len(there) < len(found):
-        out.say("not there:", *(line for d, _ in found if not d.present for line in _absent(d)))
-    if there:
-        out.say("", f"to touch something with one: palpate touch --device {there[0][0].spec.name}")
-    out.json({"devices": [figures(device, rate) for device, rate in found]})
-    return 0
-
-
-@operation(DevicesOperands, *map(options_of, HARDWARE), often="", answer=_answer, progress=False)
-def devices(asked: DevicesOperands, call: Call) -> list[tuple[Availability, Rate | None]]:
+@operation(common="", progress=False)
+def devices(
+    names: Annotated[
+        Sequence[str],
+        argument(f"only these (all by default): {', '.join(DEVICES)}", metavar="NAME", count="*"),
+    ] = (),
+    *,
+    measure: Annotated[
+        float | None,
+        option("open the hardware that is there, force off, and measure its rate for this long", unit="s"),
+    ] = None,
+    options: Annotated[Mapping[str, Any], EachOf({name: options_of(name) for name in HARDWARE})],
+) -> Found:
     """Every device that was asked for, with its rate, Hz, where that was measured."""
-    if asked.measure is not None and not asked.measure >= LEAST_MEASURE_S:
-        raise OptionError(f"--measure is {asked.measure}; it must be at least {LEAST_MEASURE_S:g} s")
-    options: dict[str, Any] = {name: call.of(options_of(name)) for name in HARDWARE}
-    found = find_devices(asked.names or None, options)
+    if measure is not None and not measure >= LEAST_MEASURE_S:
+        raise OptionError(f"--measure is {measure}; it must be at least {LEAST_MEASURE_S:g} s")
+    found = find_devices(list(names) or None, options)
     rates = {}
-    if asked.measure is not None:
+    if measure is not None:
         chosen = dict.fromkeys(d.spec.name for d in found if d.present and d.spec.name in HARDWARE)
-        rates = {name: _measured(name, options[name], asked.measure) for name in chosen}
-    return [(device, rates.get(device.spec.name) if device.present else None) for device in found]
+        rates = {name: _measured(name, options[name], measure) for name in chosen}
+    return Found([(d, rates.get(d.spec.name) if d.present else None) for d in found])
 
 
 def _measured(name: str, options: Any, seconds: float) -> Rate:

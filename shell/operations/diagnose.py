@@ -11,148 +11,133 @@ simulation lacks.
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from palpate.diagnosis.other_simulator.forces import ForcesOptions
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.progress import part
-from palpate.operations._declare import Call, operand, operation
-from palpate.operations._run import say_next
+from palpate.operations._call import Call
+from palpate.operations._declare import Given, operation, option
 from palpate.operations._shared import (
     MODEL,
     SAMPLES,
     MeshFileOptions,
+    RecordingArgument,
+    Seed,
     given_model,
-    model_flag,
-    recording_operand,
-    report_operand,
-    seed_operand,
+    report_option,
 )
 from palpate.operations._simulators import (
+    NumbersOfSimulator,
+    SettingsOfSimulator,
     fewest,
-    mended,
-    numbers_operand,
+    mended_by,
     run_along,
-    settings_operand,
     simulator,
-    simulator_operand,
+    simulator_option,
 )
 from palpate.operations.load import load
 from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
-from palpate.output import Output
+from palpate.render.options import DOCUMENTED
 from palpate.render.registry import check_settings
-from palpate.words import mn, spaced
 
 if TYPE_CHECKING:
+    from palpate.diagnosis.other_simulator.pipeline import Asked
     from palpate.diagnosis.other_simulator.result import SimulatedGap
     from palpate.diagnosis.verdict.result import Diagnosis
-    from palpate.mechanics.model.model import Model
     from palpate.mechanics.progress import Progress
     from palpate.mechanics.recording.recording import Recording
-    from palpate.operations._shared import ModelLike, RecordingLike
+    from palpate.operations._shared import ModelLike
+    from palpate.render.simulators.base import SimulatorRenderer
 
 
-@dataclass(frozen=True)
-class DiagnoseOperands:
-    """What is diagnosed, and what is written."""
-
-    recording: RecordingLike = recording_operand()
-    model: ModelLike | None = model_flag(
-        "of this recording or of another of the same object; without it the recording is reconstructed"
-    )
-    _: KW_ONLY
-    simulated: Any = operand(
-        None,
-        "forces of another simulator along the recorded path: t,fx,fy,fz (in Python also (t, force) arrays)",
-        metavar="FORCES.csv",
-        reads=True,
-    )
-    renderer: str | None = simulator_operand(
-        "a simulator that is run along the recorded path, instead of --simulated"
-    )
-    simulator_settings: str = settings_operand()
-    simulator_set: str = numbers_operand()
-    mended: str | None = operand(
-        None,
-        "run --renderer once more as the advice says, and measure the gap that is left: best, or numbers of "
-        "its settings (KEY=VALUE, comma separated)",
-        metavar="SETTINGS",
-    )
-    presses: int | None = operand(
-        None,
-        "run --renderer over so many of the recording's presses, spread over its places; default: of a dear "
-        "simulator 12, of the others all",
-        low=LEAST_PRESSES,
-    )
-    stated: Any = operand(
-        None,
-        "what that simulator was given (repeatable): young_modulus_pa, poisson_ratio, friction, "
-        "tip_radius_m; default: the model's",
-        metavar="KEY=VALUE",
-        count="repeat",
-    )
-    apply: str | None = operand(
-        None,
-        "write the improved model (object, contact, boundary effects)",
-        metavar="MODEL2",
-        writes=MODEL,
-        only="command",
-    )
-    corrected: str | None = operand(
-        None,
-        "write the recording with the instrument's effects taken off (.csv.gz, .csv)",
-        metavar="REC2",
-        writes=SAMPLES,
-        only="command",
-    )
-    report: str | None = report_operand("write the three answers with pictures as one HTML page")
-    seed: int = seed_operand()
-
-
-def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
-    from palpate.diagnosis.apply import unsure
-
-    out.say(*result.lines())
-    own: Diagnosis = getattr(result, "reality", result)
-    if asked.apply:
-        found = own.improvement()
-        better = found.model.save(asked.apply)
-        kept = [name for name in own.effects if name in better.effects]
-        out.say(f"improved model ({', '.join(kept) or 'modulus only'}): {asked.apply}")
-        before, after = (mn(gap, ".3g") for gap in (found.given_n, found.improved_n))
-        out.say(f"  replayed over the recording its force is {after} off, the given model's {before}")
-        for name in found.left_out:
-            out.say(f"  {spaced(name)} is left out: with it the replayed force was farther off")
-    if asked.corrected:
-        own.corrected().save(asked.corrected)
-        for name in unsure(own):
-            out.say(f"{spaced(name)}: smaller than twice its own error, not taken off")
-        out.say(f"corrected recording: {asked.corrected}")
-    if asked.report:
-        out.say(f"report: {result.report(asked.report)}")
-    if asked.apply:
-        out.say(f"next: feel it: palpate touch {asked.apply}")
-    else:
-        say_next(result, out)
-    out.json(result.as_json())
-    return 0
-
-
-@operation(
-    DiagnoseOperands,
-    MeshFileOptions,
-    DiagnoseOptions,
-    AttributionOptions,
-    NuisanceOptions,
-    ForcesOptions,
-    often="fast without",
-    answer=_answer,
-)
-def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
+@operation(common="fast without")
+def diagnose(
+    recording: RecordingArgument,
+    model: Annotated[
+        ModelLike | None,
+        option(
+            "of this recording or of another of the same object; without it the recording is reconstructed",
+            metavar="MODEL",
+            reads=True,
+        ),
+    ] = None,
+    *,
+    simulated: Annotated[
+        Any,
+        option(
+            "forces of another simulator along the recorded path: t,fx,fy,fz (in Python also (t, force) "
+            "arrays)",
+            metavar="FORCES.csv",
+            reads=True,
+        ),
+    ] = None,
+    renderer: Annotated[
+        str | None,
+        simulator_option("a simulator that is run along the recorded path, instead of --simulated"),
+    ] = None,
+    simulator_settings: SettingsOfSimulator = DOCUMENTED,
+    simulator_set: NumbersOfSimulator = "",
+    mended: Annotated[
+        str | None,
+        option(
+            "run --renderer once more as the advice says, and measure the gap that is left: best, or numbers "
+            "of its settings (KEY=VALUE, comma separated)",
+            metavar="SETTINGS",
+        ),
+    ] = None,
+    presses: Annotated[
+        int | None,
+        option(
+            "run --renderer over so many of the recording's presses, spread over its places; default: of a "
+            "dear simulator 12, of the others all",
+            low=LEAST_PRESSES,
+        ),
+    ] = None,
+    stated: Annotated[
+        Any,
+        option(
+            "what that simulator was given (repeatable): young_modulus_pa, poisson_ratio, friction, "
+            "tip_radius_m; default: the model's",
+            metavar="KEY=VALUE",
+            count="repeat",
+        ),
+    ] = None,
+    apply: Annotated[
+        str | None,
+        option(
+            "write the improved model (object, contact, boundary effects)",
+            metavar="MODEL2",
+            writes=MODEL,
+            only="command",
+        ),
+    ] = None,
+    corrected: Annotated[
+        str | None,
+        option(
+            "write the recording with the instrument's effects taken off (.csv.gz, .csv)",
+            metavar="REC2",
+            writes=SAMPLES,
+            only="command",
+        ),
+    ] = None,
+    report: Annotated[
+        str | None, report_option("write the three answers with pictures as one HTML page")
+    ] = None,
+    seed: Seed = 0,
+    file: Given[MeshFileOptions],
+    options: DiagnoseOptions,
+    attribution: AttributionOptions,
+    nuisance: NuisanceOptions,
+    of_forces: ForcesOptions,
+    call: Call,
+) -> Diagnosis | SimulatedGap:
     """The sim-to-real gap: where simulated and measured force differ, which effect was left out, how far the
     gap shrinks with it on places that were not fitted; N rms.
 
@@ -165,12 +150,14 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
     from palpate.mechanics.press_solver.solved_places import deepest_of_sites, said_beforehand
     from palpate.reconstruction.presses_on_model import presses_on
 
-    forces = _forces(asked)
-
-    if asked.corrected and not str(asked.corrected).endswith((".csv", ".csv.gz")):
-        raise OptionError(f"--corrected '{asked.corrected}' must end in .csv or .csv.gz")
-    options = call.of(DiagnoseOptions, seed=asked.seed)
-    source, measured = given_model(asked.model, call), read_recording(asked.recording)
+    runs = [(simulator_settings, simulator_set)]
+    if mended is not None and renderer is not None:
+        runs.append(mended_by(*runs[0], mended))
+    _check(simulated, renderer, mended, presses, stated, runs)
+    forces = None if simulated is None else _forces(simulated)
+    if corrected and not str(corrected).endswith((".csv", ".csv.gz")):
+        raise OptionError(f"--corrected '{corrected}' must end in .csv or .csv.gz")
+    source, measured = given_model(model, file), read_recording(recording)
     with call.progress("diagnose") as tell:
         if source is None:
             made = reconstruct(measured, progress=lambda s, x: tell(f"model: {s}", 0.3 * x)).model
@@ -181,55 +168,98 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
         if options.exact:
             places = deepest_of_sites(made.presses.site, made.presses.deepest)
             call.out.say(f"--exact: {said_beforehand(len(places), len(LAWS))}")
-        rules: dict[str, Any] = {
-            "nuisance": call.of(NuisanceOptions),
-            "attribution": call.of(AttributionOptions),
-        }
+        rules: dict[str, Any] = {"nuisance": nuisance, "attribution": attribution}
 
         def rest(stage: str, share: float) -> None:
             tell(stage, begun + (1 - begun) * share)
 
-        if asked.renderer is None and forces is None:
-            return diagnosed(measured, made, options, rest, **rules)
-        from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
-        from palpate.diagnosis.other_simulator.result import Mended
-        from palpate.diagnosis.other_simulator.stated import stated_of
+        result: Any
+        if renderer is None and forces is None:
+            result = diagnosed(measured, made, options, rest, **rules)
+        else:
+            from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
+            from palpate.diagnosis.other_simulator.result import Mended
+            from palpate.diagnosis.other_simulator.stated import stated_of
 
-        if forces is not None:
-            simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
-            return diagnose_simulated(measured, made, simulation, options, rest, **rules)
-        told = part(tell, begun, 1.0)
-        simulations = _simulations(asked, call, measured, made, part(told, 0.0, 0.5))
-        found = diagnose_simulated(measured, made, simulations[0], options, part(told, 0.5, 0.9), **rules)
-        for again in simulations[1:]:
-            left = diagnose_simulated(
-                measured, made, again, options, part(told, 0.9, 1.0), reality=found.reality, **rules
-            )
-            found = replace(found, mended=Mended(again.run_as, left.gap_before_n, left.effects))
-        return found
+            if forces is not None:
+                simulation = Asked(forces, stated_of(stated, made), of_forces)
+                result = diagnose_simulated(measured, made, simulation, options, rest, **rules)
+            else:
+                assert renderer is not None
+                told = part(tell, begun, 1.0)
+                half = part(told, 0.0, 0.5)
+                simulations = _simulations(
+                    [simulator(renderer, *each, made) for each in runs],
+                    measured,
+                    presses,
+                    stated,
+                    of_forces,
+                    half,
+                )
+                first, again = simulations[0], simulations[1:]
+                result = diagnose_simulated(measured, made, first, options, part(told, 0.5, 0.9), **rules)
+                for each in again:
+                    left = diagnose_simulated(
+                        measured, made, each, options, part(told, 0.9, 1.0), reality=result.reality, **rules
+                    )
+                    found = Mended(each.run_as, left.gap_before_n, left.effects)
+                    result = replace(result, mended=found)
+    own: Diagnosis = getattr(result, "reality", result)
+    if apply:
+        call.then(partial(_applied, own, apply))
+        call.following = [f"next: feel it: palpate touch {apply}"]
+    if corrected:
+        call.then(partial(_corrected, own, corrected))
+    call.then_report(result, report)
+    return result
 
 
-def _settings(asked: DiagnoseOperands) -> list[tuple[str, str]]:
-    """(settings, numbers) of each run of --renderer: as asked, then mended."""
-    settings, numbers = asked.simulator_settings, asked.simulator_set
-    runs = [(settings, numbers)]
-    return runs if asked.mended is None else [*runs, mended(settings, numbers, asked.mended)]
+def _applied(own: Diagnosis, into: str) -> list[str]:
+    """What was written, and how far off its force is."""
+    found = own.improvement()
+    better = found.model.save(into)
+    kept = [name for name in own.effects if name in better.effects]
+    before, after = (f"{1e3 * gap:.3g} mN" for gap in (found.given_n, found.improved_n))
+    return [
+        f"improved model ({', '.join(kept) or 'modulus only'}): {into}",
+        f"  replayed over the recording its force is {after} off, the given model's {before}",
+        *(
+            f"  {name.replace('_', ' ')} is left out: with it the replayed force was farther off"
+            for name in found.left_out
+        ),
+    ]
+
+
+def _corrected(own: Diagnosis, into: str) -> list[str]:
+    """What was written, and what was not taken off."""
+    from palpate.diagnosis.apply import unsure
+
+    own.corrected().save(into)
+    return [
+        *(
+            f"{name.replace('_', ' ')}: smaller than twice its own error, not taken off"
+            for name in unsure(own)
+        ),
+        f"corrected recording: {into}",
+    ]
 
 
 def _simulations(
-    asked: DiagnoseOperands, call: Call, measured: Recording, model: Model, tell: Progress
-) -> list[Any]:
-    """What --renderer gave along the recorded path as asked, then mended, over the same presses; and what it
-    says of itself."""
+    made: Sequence[SimulatorRenderer],
+    measured: Recording,
+    presses: int | None,
+    given: Any,
+    of_forces: ForcesOptions,
+    tell: Progress,
+) -> list[Asked]:
+    """What each gave along the recorded path, over the same presses; and what it says of itself."""
     import numpy as np
 
     from palpate.diagnosis.other_simulator.forces import Forces
     from palpate.diagnosis.other_simulator.pipeline import Asked
     from palpate.diagnosis.other_simulator.stated import stated_of, stated_values
 
-    assert asked.renderer is not None
-    made = [simulator(asked.renderer, *each, model) for each in _settings(asked)]
-    most = asked.presses or fewest(made)
+    most = presses or fewest(made)
     share = 1 / len(made)
     runs = [
         run_along(each, measured, part(tell, k * share, (k + 1) * share), most=most)
@@ -239,49 +269,56 @@ def _simulations(
     along, there = int(chosen.sum()), len(chosen)
     some = f", spread over its places (--presses {there}: all)" if along < there else ""
     simulations = []
-    for ran in runs:
+    for each, ran in zip(made, runs, strict=True):
         notes = (
             f"run here along {along} of the {there} recorded presses{some}: {ran.said}",
-            *(note for each in runs for note in each.notes),
+            *(note for other in runs for note in other.notes),
             *(f"it cannot say: {x}" for x in ran.adapter.cannot),
         )
-        forces = Forces(measured.t, ran.force, asked.renderer, notes, chosen)
+        forces = Forces(measured.t, ran.force, each.name, notes, chosen)
         # what the adapter gave it, but for what is said
-        stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
+        stated = stated_of({**ran.adapter.stated, **stated_values(given)}, each.model)
         of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
-        own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
-        simulations.append(Asked(forces, stated, own_clock, *of_adapter))
+        simulations.append(Asked(forces, stated, replace(of_forces, clock_offset_s=0.0), *of_adapter))
     return simulations
 
 
-def _forces(asked: DiagnoseOperands) -> Any:
-    """The simulated forces, looked at before the work; None where there are none."""
-    if asked.simulated is not None and asked.renderer is not None:
+def _check(
+    simulated: Any,
+    renderer: str | None,
+    mended: str | None,
+    presses: int | None,
+    stated: Any,
+    runs: Sequence[tuple[str, str]],
+) -> None:
+    """Before the work: what is said of a simulator is of one that is named."""
+    if simulated is not None and renderer is not None:
         raise OptionError("--simulated and --renderer both name a simulator: name one")
-    if asked.mended is not None and asked.renderer is None:
+    if mended is not None and renderer is None:
         raise OptionError("--mended runs a simulator once more: name it by --renderer")
-    if asked.presses is not None and asked.renderer is None:
+    if presses is not None and renderer is None:
         raise OptionError("--presses says over how many a simulator is run: name it by --renderer")
-    if asked.renderer is not None:
-        for each in _settings(asked):
-            check_settings(asked.renderer, *each)
-    if asked.simulated is None:
-        if asked.stated and asked.renderer is None:
-            words = "name its forces by --simulated, or the simulator by --renderer"
-            raise OptionError(f"--stated says what a simulator was given: {words}")
-    if asked.stated:
+    if renderer is not None:
+        for each in runs:
+            check_settings(renderer, *each)
+    elif stated and simulated is None:
+        words = "name its forces by --simulated, or the simulator by --renderer"
+        raise OptionError(f"--stated says what a simulator was given: {words}")
+    if stated:
         from palpate.diagnosis.other_simulator.stated import stated_values
 
-        stated_values(asked.stated)
-    if asked.simulated is None:
-        return None
+        stated_values(stated)
+
+
+def _forces(simulated: Any) -> Any:
+    """The simulated forces, looked at before the work."""
     from palpate.diagnosis.other_simulator.forces import read_forces, sorted_forces
 
-    if isinstance(asked.simulated, tuple | list):
+    if isinstance(simulated, tuple | list):
         import numpy as np
 
-        t, force = (np.asarray(each, dtype=float) for each in asked.simulated)
+        t, force = (np.asarray(each, dtype=float) for each in simulated)
         if t.ndim != 1 or force.shape != (len(t), 3):
             raise OptionError(f"simulated needs t (n,) and force (n, 3); got {t.shape} and {force.shape}")
         return sorted_forces(t, force, "simulated")
-    return read_forces(asked.simulated)
+    return read_forces(simulated)

@@ -2,32 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from palpate.mechanics.errors import OptionError
-from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._call import Call
+from palpate.operations._declare import operation, option
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
     from palpate.operations._shared import ModelLike
 
 
-@dataclass(frozen=True)
-class LoadOperands:
-    """What is loaded."""
-
-    source: ModelLike = operand(
-        REQUIRED,
-        'a folder that `reconstruct` wrote; the name of a scene ("demo", "nodule", "bean", ...), a scene\'s '
-        '.toml, a phantom ("cylinder", ..., or a closed surface as STL, PLY or VTU in m), or a recording, '
-        "which is then reconstructed",
-    )
-
-
-@operation(LoadOperands)
-def load(asked: LoadOperands, call: Call) -> Model:
+@operation()
+def load(
+    source: Annotated[
+        ModelLike,
+        option(
+            'a folder that `reconstruct` wrote; the name of a scene ("demo", "nodule", "bean", ...), a '
+            'scene\'s .toml, a phantom ("cylinder", ..., or a closed surface as STL, PLY or VTU in m), or a '
+            "recording, which is then reconstructed"
+        ),
+    ],
+    *,
+    call: Call,
+) -> Model:
     """The model of a MODEL folder; or of a scene, which is built the first time and then kept.
 
     Moduli Pa, lengths m, device frame. Raises ModelError or SceneError where there is none.
@@ -37,7 +36,6 @@ def load(asked: LoadOperands, call: Call) -> Model:
     from palpate.scenes.build import model_of as scene_model
     from palpate.scenes.scene import Scene, load_scene
 
-    source = asked.source
     if isinstance(source, Plain):
         return source
     held = getattr(source, "model", None)

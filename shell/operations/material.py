@@ -10,22 +10,12 @@ failure, relaxation curves. Columns and units are told by their names, or by --c
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from palpate.importing.machine_tests import KINDS
-from palpate.operations._declare import Call, operand, operation
-from palpate.operations._run import answer
-from palpate.operations._shared import (
-    columns_operand,
-    named,
-    poisson_operand,
-    report_operand,
-    seed_operand,
-    tip_radius_operand,
-    units_operand,
-)
-from palpate.output import Output
+from palpate.operations._call import Call
+from palpate.operations._declare import argument, operation, option
+from palpate.operations._shared import Seed, Units, columns_option, named, report_option
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,81 +23,64 @@ if TYPE_CHECKING:
     from palpate.diagnosis.specimen.result import Material
 
 
-@dataclass(frozen=True)
-class MaterialOperands:
-    """The curves, and what they are of."""
-
-    files: tuple[str | Path, ...] = operand(
-        (), "a curve each", metavar="FILE", positional=True, count="+", reads=True
-    )
-    _: KW_ONLY
-    kind: str = operand("auto", "of test; auto goes by the headers", choices=("auto", *KINDS))
-    tip_radius_m: float | None = tip_radius_operand("of an indenter's sphere, where the files do not say")
-    layer_m: float | None = operand(None, "thickness of the sample; None: a half-space", unit="m")
-    poisson_ratio: float = poisson_operand("of the material", 0.49)
-    specimens: bool = operand(False, "each indentation is of another piece; default: one piece", rare=True)
-    columns: Mapping[str, str] | None = columns_operand("t, depth (or height), load")
-    units: Mapping[str, str] | None = units_operand()
-    travel: str | None = operand(
-        None, "which way the position counts; None: by what a solid does", choices=("into", "out")
-    )
-    compression: str | None = operand(
-        None,
-        "the load's sign as it presses; None: by what a solid does",
-        choices=("positive", "negative"),
-        rare=True,
-    )
-    clock: str | None = operand(
-        None, "where time goes back: one clock, or blocks with their own", choices=("one", "blocks")
-    )
-    fast: bool = operand(False, "fewer effects are tried", rare=True)
-    report: str | None = report_operand("write the answer with its curves as a page")
-    seed: int = seed_operand()
-
-
-def _answer(result: Material, asked: MaterialOperands, out: Output) -> int:
-    answer(result, asked, out)
-    return 0 if result.predicts else 1
-
-
-@operation(MaterialOperands, answer=_answer)
-def material(asked: MaterialOperands, call: Call) -> Material:
+@operation()
+def material(
+    *files: Annotated[str | Path, argument("a curve each", metavar="FILE", count="+", reads=True)],
+    kind: Annotated[str, option("of test; auto goes by the headers", choices=("auto", *KINDS))] = "auto",
+    tip_radius_m: Annotated[
+        float | None, option("of an indenter's sphere, where the files do not say", unit="m")
+    ] = None,
+    layer_m: Annotated[float | None, option("thickness of the sample; None: a half-space", unit="m")] = None,
+    poisson_ratio: Annotated[float, option("of the material")] = 0.49,
+    specimens: Annotated[
+        bool, option("each indentation is of another piece; default: one piece", advanced=True)
+    ] = False,
+    columns: Annotated[Mapping[str, str] | None, columns_option("t, depth (or height), load")] = None,
+    units: Units = None,
+    travel: Annotated[
+        str | None,
+        option("which way the position counts; None: by what a solid does", choices=("into", "out")),
+    ] = None,
+    compression: Annotated[
+        str | None,
+        option(
+            "the load's sign as it presses; None: by what a solid does",
+            choices=("positive", "negative"),
+            advanced=True,
+        ),
+    ] = None,
+    clock: Annotated[
+        str | None,
+        option("where time goes back: one clock, or blocks with their own", choices=("one", "blocks")),
+    ] = None,
+    fast: Annotated[bool, option("fewer effects are tried", advanced=True)] = False,
+    report: Annotated[str | None, report_option("write the answer with its curves as a page")] = None,
+    seed: Seed = 0,
+    call: Call,
+) -> Material:
     """The material of a specimen from a machine's curves: indentation, compression, tension or relaxation.
 
     From 6 indentations on, effects are searched for as `diagnose` does, each curve held out.
     Lengths m, moduli Pa. Raises RecordingError where a file cannot be read, ContactError
     where nothing is touched.
     """
-    from palpate.importing.kinds import with_answers
-
-    return with_answers(_made, asked, call)
-
-
-def _made(asked: MaterialOperands, call: Call) -> Material:
     from palpate.diagnosis.specimen.material import material_of
     from palpate.importing.curve_meaning import SaidOfCurves
     from palpate.importing.machine_tests import read_tests
 
-    tests = read_tests(
-        asked.files,
-        kind=asked.kind,
-        tip_radius_m=asked.tip_radius_m,
-        said=SaidOfCurves(
-            named(asked.columns, "columns"),
-            named(asked.units, "units"),
-            asked.travel,
-            asked.compression,
-            asked.clock,
-        ),
-    )
+    said = SaidOfCurves(named(columns, "columns"), named(units, "units"), travel, compression, clock)
+    tests = read_tests(files, kind=kind, tip_radius_m=tip_radius_m, said=said)
     with call.progress("material") as tell:
-        return material_of(
+        result = material_of(
             tests,
-            asked.files,
-            layer_m=asked.layer_m,
-            poisson_ratio=asked.poisson_ratio,
-            specimens=asked.specimens,
-            fast=asked.fast,
-            seed=asked.seed,
+            files,
+            layer_m=layer_m,
+            poisson_ratio=poisson_ratio,
+            specimens=specimens,
+            fast=fast,
+            seed=seed,
             progress=tell,
         )
+    call.then_report(result, report)
+    call.exit_code = 0 if result.predicts else 1
+    return result

@@ -8,194 +8,184 @@ elsewhere it ends in one line that names the flag. SI units. Exit code 1 where t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.mechanics.errors import OptionError
-from palpate.operations._declare import Call, operand, operation
-from palpate.operations._run import say_next
-from palpate.operations._shared import (
-    MODEL,
-    columns_operand,
-    named,
-    report_operand,
-    save_operand,
-    seed_operand,
-    tip_radius_operand,
-    units_operand,
-)
-from palpate.output import Output
+from palpate.operations._call import Call
+from palpate.operations._declare import argument, operation, option
+from palpate.operations._shared import MODEL, Seed, Units, columns_option, named, report_option, save_option
 
 if TYPE_CHECKING:
     from palpate.importing.kinds import Opened
+    from palpate.mechanics.progress import Progress
     from palpate.mechanics.recording.recording import Recording
 
 
-@dataclass(frozen=True)
-class OpenOperands:
-    """The files, and what is said of them; all of it is optional where the files tell it."""
-
-    files: tuple[Any, ...] = operand(
-        (), "file, or folder of a MODEL or ROS 2 bag; in Python also a recording", metavar="FILE",
-        positional=True, count="+", reads=True,
-    )  # fmt: skip
-    _: KW_ONLY
-    save: str | Path | None = save_operand(
-        "folder of the model to write, where one comes of it", "MODEL", MODEL
-    )
-    report: str | None = report_operand("the page; default: NAME-palpate.html here, 'none' for no page")
-    tip_radius_m: float | None = tip_radius_operand("of the tool or indenter, where no file says it")
-    columns: Mapping[str, str] | None = columns_operand(
-        "as of import; of curves t, depth (or height), load", rare=True
-    )
-    units: Mapping[str, str] | None = units_operand()
-    force_on: str | None = operand(None, "whose force it is", choices=("tool", "object"))
-    travel: str | None = operand(
-        None, "which way a machine's position counts", choices=("into", "out"), rare=True
-    )
-    compression: str | None = operand(
-        None, "a machine's load as it presses", choices=("positive", "negative"), rare=True
-    )
-    clock: str | None = operand(None, "where time goes back", choices=("one", "blocks"), rare=True)
-    slab_m: float | None = operand(None, "the object is a slab so thick", unit="m", flag="--slab")
-    half_space: bool = operand(False, "the object is deep and wide")
-    layer_m: float | None = operand(None, "thickness of a machine's sample; None: a half-space", unit="m")
-    young_modulus_pa: float | None = operand(None, "of a surface's file", unit="Pa", flag="--modulus")
-    unit: str = operand("m", "of a surface's file: m, cm, mm, um, in")
-    fast: bool = operand(False, "fewer effects are tried", rare=True)
-    seed: int = seed_operand()
-
-
-def _answer(result: Opened, asked: OpenOperands, out: Output) -> int:
-    out.say(*result.lines())
-    page = asked.report
-    if page is None:
-        first = Path(asked.files[0])
-        page = f"{first.name.split('.')[0] or 'opened'}-palpate.html"
-    if page != "none":
-        out.say(f"report: {result.report(page)}")
-    say_next(result, out)
-    out.json(result.as_json())
-    return 0 if result.good else 1
-
-
-@operation(OpenOperands, answer=_answer)
-def open(asked: OpenOperands, call: Call) -> Opened:
+@operation()
+def open(
+    *files: Annotated[
+        Any,
+        argument(
+            "file, or folder of a MODEL or ROS 2 bag; in Python also a recording",
+            metavar="FILE",
+            count="+",
+            reads=True,
+        ),
+    ],
+    save: Annotated[
+        str | Path | None, save_option("folder of the model to write, where one comes of it", "MODEL", MODEL)
+    ] = None,
+    report: Annotated[
+        str | None, report_option("the page; default: NAME-palpate.html here, 'none' for no page")
+    ] = None,
+    tip_radius_m: Annotated[
+        float | None, option("of the tool or indenter, where no file says it", unit="m")
+    ] = None,
+    columns: Annotated[
+        Mapping[str, str] | None,
+        columns_option("as of import; of curves t, depth (or height), load", advanced=True),
+    ] = None,
+    units: Units = None,
+    force_on: Annotated[str | None, option("whose force it is", choices=("tool", "object"))] = None,
+    travel: Annotated[
+        str | None, option("which way a machine's position counts", choices=("into", "out"), advanced=True)
+    ] = None,
+    compression: Annotated[
+        str | None, option("a machine's load as it presses", choices=("positive", "negative"), advanced=True)
+    ] = None,
+    clock: Annotated[
+        str | None, option("where time goes back", choices=("one", "blocks"), advanced=True)
+    ] = None,
+    slab_m: Annotated[float | None, option("the object is a slab so thick", unit="m", flag="--slab")] = None,
+    half_space: Annotated[bool, option("the object is deep and wide")] = False,
+    layer_m: Annotated[
+        float | None, option("thickness of a machine's sample; None: a half-space", unit="m")
+    ] = None,
+    young_modulus_pa: Annotated[
+        float | None, option("of a surface's file", unit="Pa", flag="--modulus")
+    ] = None,
+    unit: Annotated[str, option("of a surface's file: m, cm, mm, um, in")] = "m",
+    fast: Annotated[bool, option("fewer effects are tried", advanced=True)] = False,
+    seed: Seed = 0,
+    call: Call,
+) -> Opened:
     """Whatever it is: what it was taken for, brought in, checked, and the one sensible thing done.
 
     `result` is a Reconstruction, Material, Model, or the Checkup of a recording with something grave; lengths
     m, forces N, moduli Pa. Raises RecordingError where nothing can be understood, and what `reconstruct`,
     `material` and `model_of` raise.
     """
-    from palpate.importing.kinds import with_answers
-
-    if not asked.files:
-        raise OptionError("pp.open needs a file: name at least one")
-    return with_answers(_opened, asked, call)
-
-
-def _opened(asked: OpenOperands, call: Call) -> Opened:
     from palpate.importing.kinds import kind_of_file
     from palpate.mechanics.recording.recording import Recording as Plain
+    from palpate.operations.read_recording import read_recording
 
-    kind = "recording" if isinstance(asked.files[0], Plain) else kind_of_file(
-        Path(asked.files[0]), named(asked.columns, "columns"), named(asked.units, "units")
+    if not files:
+        raise OptionError("pp.open needs a file: name at least one")
+    kind = "recording" if isinstance(files[0], Plain) else kind_of_file(
+        Path(files[0]), named(columns, "columns"), named(units, "units")
     )  # fmt: skip
-    return _DO[kind](asked, call)
+    of_file = {"tip_radius_m": tip_radius_m, "columns": columns, "units": units, "clock": clock}
+    thing = {"slab_m": slab_m} if slab_m else {"half_space": True} if half_space else {}
+    made = partial(_reconstructed, files, thing, save=save, seed=seed, progress=call.wanted)
+    match kind:
+        case "model":
+            result = _model(files)
+        case "mesh":
+            result = _mesh(files, save, unit, tip_radius_m, young_modulus_pa, call.wanted)
+        case "curves":
+            of_machine = {"travel": travel, "compression": compression, "layer_m": layer_m, "fast": fast}
+            result = _curves(files, seed=seed, progress=call.wanted, **of_file, **of_machine)
+        case "table":
+            result = _table(files, made, thing=thing, force_on=force_on, **of_file)
+        case _:
+            result = made(read_recording(_only(files)), {"took it for": "a recording"})
+    page = f"{Path(files[0]).name.split('.')[0] or 'opened'}-palpate.html" if report is None else report
+    if page != "none":
+        call.then(lambda: [f"report: {result.report(page)}"])
+    call.exit_code = 0 if result.good else 1
+    return result
 
 
-def _model(asked: OpenOperands, call: Call) -> Opened:
+def _model(files: tuple[Any, ...]) -> Opened:
     from palpate.importing.kinds import Opened
     from palpate.operations.load import load
 
-    return Opened("model", _names(asked), {"took it for": "a MODEL"}, result=load(_only(asked)))
+    return Opened("model", _names(files), {"took it for": "a MODEL"}, result=load(_only(files)))
 
 
-def _mesh(asked: OpenOperands, call: Call) -> Opened:
+def _mesh(
+    files: tuple[Any, ...],
+    save: str | Path | None,
+    unit: str,
+    tip_radius_m: float | None,
+    modulus_pa: float | None,
+    progress: bool | Progress,
+) -> Opened:
     from palpate.importing.kinds import Opened
     from palpate.operations.model import model_of
 
-    given = {"tip_radius_m": asked.tip_radius_m, "young_modulus_pa": asked.young_modulus_pa}
     made = model_of(
-        _only(asked),
-        save=asked.save,
-        unit=asked.unit,
-        progress=call.wanted,
-        **{key: value for key, value in given.items() if value is not None},
+        _only(files), modulus_pa, save=save, unit=unit, tip_radius_m=tip_radius_m, progress=progress
     )
-    modulus = asked.young_modulus_pa
-    notes = () if modulus else ("nobody said a modulus: 20000 Pa; --modulus PA states another",)
-    understood = {"took it for": f"the surface of an object, lengths in {asked.unit}"}
-    return Opened("mesh", _names(asked), understood, result=made, notes=notes)
+    notes = () if modulus_pa else ("nobody said a modulus: 20000 Pa; --modulus PA states another",)
+    understood = {"took it for": f"the surface of an object, lengths in {unit}"}
+    return Opened("mesh", _names(files), understood, result=made, notes=notes)
 
 
-def _curves(asked: OpenOperands, call: Call) -> Opened:
+def _curves(files: tuple[Any, ...], **said: Any) -> Opened:
     from palpate.importing.kinds import Opened
     from palpate.operations.material import material
 
-    names = (
-        "tip_radius_m", "columns", "units", "travel", "compression", "clock", "layer_m", "fast", "seed"
-    )  # fmt: skip
-    made = material(*asked.files, progress=call.wanted, **{name: getattr(asked, name) for name in names})
+    made = material(*files, **said)
     understood = {"took it for": f"a machine's curves ({made.kind})", "curves": str(made.curves)}
-    return Opened("curves", _names(asked), understood, result=made, odds=made.odds)
+    return Opened("curves", _names(files), understood, result=made, odds=made.odds)
 
 
-def _table(asked: OpenOperands, call: Call) -> Opened:
+def _table(files: tuple[Any, ...], made: Callable[..., Opened], **said: Any) -> Opened:
     from palpate.operations.import_ import import_table
 
-    thing = {"slab_m": asked.slab_m} if asked.slab_m else {"half_space": True} if asked.half_space else {}
-    names = ("tip_radius_m", "columns", "units", "force_on", "clock")
-    brought = import_table(*asked.files, thing=thing, **{name: getattr(asked, name) for name in names})
+    brought = import_table(*files, **said)
     understood = {
         "took it for": "a recording in another program's table",
         **{role: str(c).partition(" = ")[2] for role, c in brought.understood.columns.items()},
     }
-    return _reconstructed(
-        asked, call, brought.recording, understood, brought.understood.notes, brought.understood.odds
-    )
-
-
-def _recording(asked: OpenOperands, call: Call) -> Opened:
-    from palpate.operations.read_recording import read_recording
-
-    understood = {"took it for": "a recording"}
-    return _reconstructed(asked, call, read_recording(_only(asked)), understood, (), None)
+    return made(brought.recording, understood, brought.understood.notes, brought.understood.odds)
 
 
 def _reconstructed(
-    asked: OpenOperands, call: Call, recording: Recording, understood: dict[str, str],
-    notes: tuple[str, ...], odds: float | None,
-) -> Opened:  # fmt: skip
+    files: tuple[Any, ...],
+    geometry: Mapping[str, Any],
+    recording: Recording,
+    understood: dict[str, str],
+    notes: tuple[str, ...] = (),
+    odds: float | None = None,
+    *,
+    save: str | Path | None,
+    seed: int,
+    progress: bool | Progress,
+) -> Opened:
     """Checked; reconstructed unless something is grave."""
     from palpate.importing.kinds import Opened
     from palpate.operations.check import check
     from palpate.operations.reconstruct import reconstruct
 
-    checked = check(recording, progress=call.wanted)
+    checked = check(recording, progress=progress)
     result: Any = checked
     if not checked.grave:
-        given: dict[str, Any] = {"field": "where-beaten"}
-        if asked.slab_m:
-            given["slab_m"] = asked.slab_m
-        if asked.half_space:
-            given["half_space"] = True
-        result = reconstruct(recording, save=asked.save, seed=asked.seed, progress=call.wanted, **given)
-    return Opened("recording", _names(asked), understood, result=result, notes=notes, odds=odds or 1e6)
-
-
-def _only(asked: OpenOperands) -> Any:
-    if len(asked.files) > 1:
-        raise OptionError(
-            f"{len(asked.files)} files were given, and '{asked.files[0]}' stands alone: name one"
+        result = reconstruct(
+            recording, save=save, seed=seed, progress=progress, field="where-beaten", **geometry
         )
-    return asked.files[0]
+    return Opened("recording", _names(files), understood, result=result, notes=notes, odds=odds or 1e6)
 
 
-def _names(asked: OpenOperands) -> tuple[str, ...]:
-    return tuple(getattr(file, "object_name", None) or Path(file).name for file in asked.files)
+def _only(files: tuple[Any, ...]) -> Any:
+    if len(files) > 1:
+        raise OptionError(f"{len(files)} files were given, and '{files[0]}' stands alone: name one")
+    return files[0]
 
 
-_DO = {"model": _model, "mesh": _mesh, "curves": _curves, "table": _table, "recording": _recording}
+def _names(files: tuple[Any, ...]) -> tuple[str, ...]:
+    return tuple(getattr(file, "object_name", None) or Path(file).name for file in files)

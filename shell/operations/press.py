@@ -9,25 +9,17 @@ stored one: exit 1 where the forces differ by more than --tolerance anywhere.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from palpate.mechanics.disk.surface_files import is_surface_file
 from palpate.mechanics.options import EXACT
-from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._run import say_next
-from palpate.operations._shared import (
-    MeshFileOptions,
-    given_model,
-    model_operand,
-    output_operand,
-    renderer_operand,
-    tip_radius_operand,
-)
+from palpate.operations._call import Call
+from palpate.operations._declare import Given, operation, option
+from palpate.operations._shared import MeshFileOptions, Renders, given_model, model_argument, output_option
 from palpate.operations._to_argparse import vector
 from palpate.operations.renderer import touched_scene
-from palpate.output import Output
 from palpate.render.options import RenderOptions
 from palpate.render.support import SupportOptions
 
@@ -37,77 +29,40 @@ if TYPE_CHECKING:
     from palpate.render.press import Curve
 
 
-@dataclass(frozen=True)
-class PressOperands:
-    """Where and how to press, and what to expect."""
-
-    model: ModelLike | Renderer = model_operand()
-    at: Sequence[float] = operand(
-        REQUIRED, "point that the tip's centre is aimed at, (3,)", unit="m", metavar="X,Y,Z", parse=vector
-    )
-    direction: Sequence[float] | None = operand(
-        None,
-        "of the motion, (3,), any length; None: straight onto the support",
-        metavar="X,Y,Z",
-        parse=vector,
-    )
-    depth_m: float = operand(0.004, "along the surface's normal after first touch", unit="m")
-    speed_m_per_s: float = operand(0.01, "of the tip", unit="m/s", flag="--speed")
-    _: KW_ONLY
-    hold_s: float = operand(0.0, "at depth", unit="s", rare=True)
-    approach_m: float = operand(2e-3, "of free air before", unit="m", rare=True)
-    rate_hz: float = operand(1000.0, "samples a second", unit="Hz", rare=True)
-    tip_radius_m: float | None = tip_radius_operand("of the tool; None: the model's")
-    renderer: str = renderer_operand()
-    exact: bool = operand(False, EXACT)
-    output: str | None = output_operand("write the curve", "CURVE.csv", "palpate.render.press:CURVE")
-    expect: str | None = operand(
-        None, "a curve to compare with", metavar="CURVE.csv", reads=True, only="command"
-    )
-    tolerance: float = operand(0.02, "of --expect", unit="N", only="command")
-
-
-def _answer(curve: Curve, asked: PressOperands, out: Output) -> int:
-    """Write, compare with what is expected: 1 where the forces differ."""
-    from palpate.render.press import greatest_difference, read_curve
-    from palpate.scenes.phantoms import DEFAULT_MODULUS_PA
-
-    expected = read_curve(asked.expect) if asked.expect else None
-    if asked.output:
-        curve.save(asked.output)
-    out.say(*curve.lines())
-    if is_surface_file(Path(str(asked.model))):
-        out.say(f"  (the file says none: {DEFAULT_MODULUS_PA:g} Pa, unless --modulus states another)")
-    if asked.output:
-        out.say(f"written: {asked.output}")
-    figures, code = curve.as_json(), 0
-    if expected is not None:
-        worst, when = greatest_difference(curve, expected)
-        code = int(not worst <= asked.tolerance)
-        figures |= {
-            "difference_n": worst,
-            "at_s": when,
-            "tolerance_n": asked.tolerance,
-            "passed": code == 0,
-        }
-        out.say(
-            f"{'differs' if code else 'agrees'}: greatest difference {worst:.4g} N at {when:.4g} s, "
-            f"allowed {asked.tolerance:g} N"
-        )
-    say_next(curve, out, written=asked.output)
-    out.json(figures)
-    return code
-
-
-@operation(
-    PressOperands,
-    MeshFileOptions,
-    RenderOptions,
-    SupportOptions,
-    often="friction young_modulus_pa",
-    answer=_answer,
-)
-def press(asked: PressOperands, call: Call) -> Curve:
+@operation(common="friction young_modulus_pa")
+def press(
+    model: Annotated[ModelLike | Renderer, model_argument()],
+    at: Annotated[
+        Sequence[float],
+        option("point that the tip's centre is aimed at, (3,)", unit="m", metavar="X,Y,Z", parse=vector),
+    ],
+    direction: Annotated[
+        Sequence[float] | None,
+        option(
+            "of the motion, (3,), any length; None: straight onto the support", metavar="X,Y,Z", parse=vector
+        ),
+    ] = None,
+    depth_m: Annotated[float, option("along the surface's normal after first touch", unit="m")] = 0.004,
+    speed_m_per_s: Annotated[float, option("of the tip", unit="m/s", flag="--speed")] = 0.01,
+    *,
+    hold_s: Annotated[float, option("at depth", unit="s", advanced=True)] = 0.0,
+    approach_m: Annotated[float, option("of free air before", unit="m", advanced=True)] = 2e-3,
+    rate_hz: Annotated[float, option("samples a second", unit="Hz", advanced=True)] = 1000.0,
+    tip_radius_m: Annotated[float | None, option("of the tool; None: the model's", unit="m")] = None,
+    renderer: Renders = "fem",
+    exact: Annotated[bool, option(EXACT)] = False,
+    output: Annotated[
+        str | None, output_option("write the curve", "CURVE.csv", "palpate.render.press:CURVE")
+    ] = None,
+    expect: Annotated[
+        str | None, option("a curve to compare with", metavar="CURVE.csv", reads=True, only="command")
+    ] = None,
+    tolerance: Annotated[float, option("of --expect", unit="N", only="command")] = 0.02,
+    file: Given[MeshFileOptions],
+    render: Given[RenderOptions],
+    support: SupportOptions,
+    call: Call,
+) -> Curve:
     """One scripted press: the force response of a model at one place.
 
     A renderer that is there already saves seconds where many presses follow. Device frame; forces N on the
@@ -119,28 +74,53 @@ def press(asked: PressOperands, call: Call) -> Curve:
     from palpate.render.exact import ExactPlaces, check_renderer
     from palpate.render.press import Stroke, read_curve, solved
     from palpate.render.press import press as pressed
+    from palpate.scenes.phantoms import DEFAULT_MODULUS_PA
+    from palpate.show import next_lines
 
-    if asked.expect:
-        read_curve(asked.expect)  # before the work
-    if asked.exact:
-        check_renderer(asked.renderer)
-    make = touched_scene(given_model(asked.model, call, "a"), asked.renderer, call)
+    expected = read_curve(expect) if expect else None
+    if exact:
+        check_renderer(renderer)
+    make = touched_scene(given_model(model, file, "a"), renderer, render, support)
     with call.progress("press") as tell:
         scene = make(tell)
     places = None
-    if asked.exact:
-        places = ExactPlaces(scene.renderer, asked.tip_radius_m)
+    if exact:
+        places = ExactPlaces(scene.renderer, tip_radius_m)
         call.out.say(f"--exact: {said_beforehand(1)}")
-    straight = asked.direction is None
-    radius = scene.model.tool.tip_radius_m if asked.tip_radius_m is None else float(asked.tip_radius_m)
+    straight = direction is None
+    radius = scene.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
     curve = pressed(
         scene,
-        np.asarray(asked.at, dtype=float),
-        -scene.model.support.normal if straight else np.asarray(asked.direction, dtype=float),
-        Stroke(asked.depth_m, asked.speed_m_per_s, asked.hold_s, asked.approach_m, asked.rate_hz),
+        np.asarray(at, dtype=float),
+        -scene.model.support.normal if straight else np.asarray(direction, dtype=float),
+        Stroke(depth_m, speed_m_per_s, hold_s, approach_m, rate_hz),
         radius,
     )
-    if places is None:
-        return curve
-    with call.progress("solving the place"):
-        return solved(curve, places)
+    if places is not None:
+        with call.progress("solving the place"):
+            curve = solved(curve, places)
+    if is_surface_file(Path(str(model))):
+        call.then(f"  (the file says none: {DEFAULT_MODULUS_PA:g} Pa, unless --modulus states another)")
+    call.then_save(curve, output)
+    if expected is not None:
+        call.then(partial(_compared, curve, expected, tolerance, call))
+    call.following = [partial(next_lines, curve, written=output)]
+    return curve
+
+
+def _compared(curve: Curve, expected: Curve, tolerance: float, call: Call) -> list[str]:
+    """Whether the forces agree, in a line; the command's exit code is 1 where they differ."""
+    from palpate.render.press import greatest_difference
+
+    worst, when = greatest_difference(curve, expected)
+    call.exit_code = int(not worst <= tolerance)
+    call.figures = {
+        "difference_n": worst,
+        "at_s": when,
+        "tolerance_n": tolerance,
+        "passed": call.exit_code == 0,
+    }
+    return [
+        f"{'differs' if call.exit_code else 'agrees'}: greatest difference {worst:.4g} N at {when:.4g} s, "
+        f"allowed {tolerance:g} N"
+    ]

@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.mechanics.errors import OptionError, RecordingError
-from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._shared import tip_radius_operand
+from palpate.operations._declare import operation, option
 
 if TYPE_CHECKING:
     from palpate.mechanics.recording.recording import Recording
     from palpate.operations._shared import RecordingLike
 
 
-@dataclass(frozen=True)
-class ReadOperands:
-    """What is read."""
-
-    source: RecordingLike = operand(REQUIRED, "NAME.csv, NAME.csv.gz, NAME.toml, or an embedded name")
-
-
-@operation(ReadOperands, progress=False)
-def read_recording(asked: ReadOperands, call: Call) -> Recording:
+@operation(progress=False)
+def read_recording(
+    source: Annotated[RecordingLike, option("NAME.csv, NAME.csv.gz, NAME.toml, or an embedded name")],
+) -> Recording:
     """Read a recording: NAME.csv, NAME.csv.gz or NAME.toml, or an embedded one by its name.
 
     Times s, positions of the tip's centre m, forces on the tool N, device frame.
@@ -34,7 +27,6 @@ def read_recording(asked: ReadOperands, call: Call) -> Recording:
     from palpate.mechanics.recording.recording import read_recording as read
     from palpate.scenes.embedded import embedded_names, embedded_recording
 
-    source = asked.source
     held = source if isinstance(source, Plain) else getattr(source, "recording", None)
     if isinstance(held, Plain):
         try:
@@ -68,25 +60,22 @@ def _described(path: Path) -> bool:
     return path.with_name(stem + ".toml").exists()
 
 
-@dataclass(frozen=True)
-class ArrayOperands:
-    """Samples, and what they are of."""
-
-    t: Any = operand(REQUIRED, "times, (n,)", unit="s")
-    position: Any = operand(REQUIRED, "of the tip's centre, (n, 3)", unit="m")
-    force: Any = operand(REQUIRED, "(n, 3)", unit="N")
-    _: KW_ONLY
-    tip_radius_m: float | None = tip_radius_operand("of the tool's spherical tip; also said as tip_radius")
-    tip_radius: float | None = operand(None, "the same", unit="m")
-    force_on: str | None = operand(
-        None, "whose force it is; None: by what a solid does", choices=("tool", "object")
-    )
-    units: Any = operand(None, "of the arrays, where they are in others: {'position': 'mm'}")
-    thing: Any = operand(None, "what [object] of a recording says: {'slab_m': 0.03}")
-
-
-@operation(ArrayOperands, progress=False)
-def recording(asked: ArrayOperands, call: Call) -> Recording:
+@operation(progress=False)
+def recording(
+    t: Annotated[Any, option("times, (n,)", unit="s")],
+    position: Annotated[Any, option("of the tip's centre, (n, 3)", unit="m")],
+    force: Annotated[Any, option("(n, 3)", unit="N")],
+    *,
+    tip_radius_m: Annotated[
+        float | None, option("of the tool's spherical tip; also said as tip_radius", unit="m")
+    ] = None,
+    tip_radius: Annotated[float | None, option("the same", unit="m")] = None,
+    force_on: Annotated[
+        str | None, option("whose force it is; None: by what a solid does", choices=("tool", "object"))
+    ] = None,
+    units: Annotated[Any, option("of the arrays, where they are in others: {'position': 'mm'}")] = None,
+    thing: Annotated[Any, option("what [object] of a recording says: {'slab_m': 0.03}")] = None,
+) -> Recording:
     """Arrays as a recording, with the checks that files get: units (s, m, N), sizes, whose force it is.
 
     Raises RecordingError where shapes disagree, a unit is doubtful or something needed is missing.
@@ -97,7 +86,7 @@ def recording(asked: ArrayOperands, call: Call) -> Recording:
     from palpate.importing.mapping import Said
     from palpate.importing.tables import Table
 
-    t, position, force = (np.asarray(v, dtype=float) for v in (asked.t, asked.position, asked.force))
+    t, position, force = (np.asarray(v, dtype=float) for v in (t, position, force))
     if t.ndim != 1 or position.shape != (len(t), 3) or force.shape != (len(t), 3):
         raise RecordingError(
             f"t is {t.shape}, position {position.shape}, force {force.shape}; allowed are (n,), (n, 3) "
@@ -106,7 +95,7 @@ def recording(asked: ArrayOperands, call: Call) -> Recording:
     names = ("t", "x", "y", "z", "fx", "fy", "fz")
     columns = dict(zip(names, np.column_stack([t, position, force]).T, strict=True))
     said = Said(
-        tip_radius_m=asked.tip_radius_m if asked.tip_radius is None else asked.tip_radius,
-        force_on=asked.force_on, units=asked.units or {}, thing=asked.thing or {},
+        tip_radius_m=tip_radius_m if tip_radius is None else tip_radius,
+        force_on=force_on, units=units or {}, thing=thing or {},
     )  # fmt: skip
     return understand([Table("arrays", columns)], said, "arrays").recording

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import unknown
 from palpate.mechanics.progress import Progress
-from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._call import Call
+from palpate.operations._declare import Given, operation, option
 from palpate.operations._shared import with_friction
 from palpate.operations.load import load
 from palpate.render.options import RenderOptions
@@ -23,36 +23,33 @@ if TYPE_CHECKING:
     from palpate.render.scene import TouchScene
 
 
-@dataclass(frozen=True)
-class RendererOperands:
-    """Whose, and which."""
-
-    model: ModelLike | Renderer = operand(REQUIRED, "of which object")
-    name: str = operand("fem", f"one of {', '.join(names())}")
-    _: KW_ONLY
-
-
-@operation(RendererOperands, RenderOptions)
-def renderer(asked: RendererOperands, call: Call) -> Renderer:
+@operation()
+def renderer(
+    model: Annotated[ModelLike | Renderer, option("of which object")],
+    name: Annotated[str, option(f"one of {', '.join(names())}")] = "fem",
+    *,
+    render: Given[RenderOptions],
+    call: Call,
+) -> Renderer:
     """The renderer of a model: `state = r.start()`, then `state, forces = r.step(state, tips)` at 1 kHz.
 
     tips (m, 3) m are the tips' centres, forces (m, 3) N act on the tool; device frame. The model's compliance
     is computed, some seconds, or read from its folder. Raises OptionError.
     """
-    make = touched_scene(asked.model, asked.name, call)
+    make = touched_scene(model, name, render, SupportOptions())
     with call.progress("renderer") as tell:
         return make(tell).renderer
 
 
-def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], TouchScene]:
-    """What will make the renderer, on its model's support; options are looked at at once."""
+def touched_scene(
+    model: Any, name: str, given: Mapping[str, Any], support: SupportOptions
+) -> Callable[[Progress], TouchScene]:
+    """What will make the renderer, on its model's support; its options are looked at at once."""
     from palpate.render.base import Renderer
     from palpate.render.scene import scene_of
     from palpate.render.surface.felt_surface import with_own_stiffness
 
-    support = call.of(SupportOptions)
     if isinstance(model, Renderer):
-        given = call.values(RenderOptions)
         if given:
             words = "a renderer that is there keeps its options; give them to pp.renderer"
             raise OptionError(f"{', '.join(given)}: {words}")
@@ -60,7 +57,7 @@ def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], Tou
     allowed = (*names(), *simulator_names())
     if name not in allowed:
         raise OptionError(unknown(name, "renderer", allowed))
-    chosen = _with_scene(model, call.of(RenderOptions))
+    chosen = _with_scene(model, RenderOptions(**given))
 
     def make(tell: Progress) -> TouchScene:
         made = create(name, load(model, progress=tell), chosen, tell)

@@ -7,13 +7,13 @@ measured force over the contact samples: phase II, from first touch to its loss 
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from palpate.mechanics.errors import ContactError, OptionError
 from palpate.mechanics.options import EXACT
-from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._shared import output_operand, recording_operand, renderer_operand
+from palpate.operations._call import Call
+from palpate.operations._declare import Given, argument, operation, option
+from palpate.operations._shared import RecordingArgument, Renders, output_option
 from palpate.operations.read_recording import read_recording
 from palpate.operations.renderer import touched_scene
 from palpate.render.options import RenderOptions
@@ -23,27 +23,27 @@ if TYPE_CHECKING:
     import palpate.mechanics.model.model
     import palpate.mechanics.recording.recording
     from palpate.mechanics.presses.table import Presses
-    from palpate.operations._shared import ModelLike, RecordingLike
+    from palpate.operations._shared import ModelLike
     from palpate.render.base import Renderer
     from palpate.render.replay import ReplayResult
 
 
-@dataclass(frozen=True)
-class ReplayOperands:
-    """What is touched, along which path."""
-
-    model: ModelLike | Renderer = operand(
-        REQUIRED, "folder of a model, or a scene", metavar="MODEL", positional=True, reads=True
-    )
-    recording: RecordingLike = recording_operand()
-    renderer: str = renderer_operand()
-    _: KW_ONLY
-    exact: bool = operand(False, EXACT)
-    output: str | None = output_operand("write the forces", "FORCES.csv", "palpate.render.replay:FORCES")
-
-
-@operation(ReplayOperands, RenderOptions, SupportOptions, often="friction dent_law effects")
-def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
+@operation(common="friction dent_law effects")
+def replay(
+    model: Annotated[
+        ModelLike | Renderer, argument("folder of a model, or a scene", metavar="MODEL", reads=True)
+    ],
+    recording: RecordingArgument,
+    renderer: Renders = "fem",
+    *,
+    exact: Annotated[bool, option(EXACT)] = False,
+    output: Annotated[
+        str | None, output_option("write the forces", "FORCES.csv", "palpate.render.replay:FORCES")
+    ] = None,
+    render: Given[RenderOptions],
+    support: SupportOptions,
+    call: Call,
+) -> ReplayResult:
     """Feed a recorded tip path to a renderer and compare its force with the measured one.
 
     model: or a renderer that is there already. The result has t (n,) s, force_n (n, 3) N on the tool, the
@@ -56,10 +56,10 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     from palpate.render.exact import ExactPlaces, check_renderer, exact_replay
     from palpate.render.replay import ReplayResult, replay_error, replay_recording
 
-    if asked.exact:
-        check_renderer(asked.renderer)
-    make = touched_scene(asked.model, asked.renderer, call)
-    measured = read_recording(asked.recording)
+    if exact:
+        check_renderer(renderer)
+    make = touched_scene(model, renderer, render, support)
+    measured = read_recording(recording)
     if is_points(measured):
         raise OptionError(
             f"'{measured.name}' holds points without a time, and a replay needs a path: reconstruct, compare "
@@ -69,16 +69,16 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         scene = make(tell)
         check_near(measured, scene.model)
         forces = replay_recording(scene, measured, tell)
-    presses, exact = _touched(measured, scene.model), None
-    if asked.exact:
+    presses, solved = _touched(measured, scene.model), None
+    if exact:
         places = ExactPlaces(scene.renderer, measured.tip_radius_m)
         sites = deepest_of_sites(presses.site, presses.deepest)
         call.out.say(f"--exact: {said_beforehand(len(sites))}")
         with call.progress("solving") as tell:
-            exact = exact_replay(places, presses, sites, measured.t, measured.position, forces, tell)
-        forces = exact.force_n
+            solved = exact_replay(places, presses, sites, measured.t, measured.position, forces, tell)
+        forces = solved.force_n
     error = replay_error(measured, presses, forces)
-    return ReplayResult(
+    result = ReplayResult(
         **vars(error),
         recording=measured,
         model=scene.model,
@@ -86,8 +86,10 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         t=measured.t,
         force_n=forces,
         used=scene.renderer,
-        exact=exact,
+        exact=solved,
     )
+    call.then_save(result, output)
+    return result
 
 
 def _touched(

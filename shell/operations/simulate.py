@@ -11,18 +11,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.mechanics.disk.writing import JSON, PNG, atomic_file
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import number, pairs, unknown
-from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._run import say_next
-from palpate.operations._shared import SAMPLES, report_operand, save_operand, seed_operand
+from palpate.operations._call import Call
+from palpate.operations._declare import Given, argument, operation, option
+from palpate.operations._shared import SAMPLES, Seed, report_option, save_option
 from palpate.operations._to_argparse import natural
-from palpate.output import Output, emit_json
+from palpate.output import emit_json
 from palpate.scenes.laboratory.effects import REGISTRY
 from palpate.scenes.laboratory.hand import HandOptions
 from palpate.scenes.laboratory.session import SimulateOptions
@@ -31,55 +31,6 @@ from palpate.scenes.phantoms import PHANTOMS
 if TYPE_CHECKING:
     from palpate.scenes.laboratory.simulate import Simulation
     from palpate.scenes.phantoms import Phantom
-
-
-@dataclass(frozen=True)
-class SimulateOperands:
-    """What is explored, by whom, and what is written."""
-
-    phantom: str | Path | Phantom = operand(
-        REQUIRED, f"{', '.join(PHANTOMS)}, or a surface file", metavar="PHANTOM", positional=True, reads=True
-    )
-    effects: Mapping[str, float] | None = operand(
-        None,
-        "an effect and its strength (repeatable; docs/reference/strengths.md: what 1 is; 0 leaves it out): "
-        f"{', '.join(REGISTRY)}",
-        flag="--effect",
-        metavar="NAME=STRENGTH",
-        count="repeat",
-    )
-    _: KW_ONLY
-    save: str | Path | None = save_operand("recording to write (.csv.gz, .csv)", "REC", SAMPLES, needed=True)
-    seal: bool = operand(False, "withhold the truth; needs --truth", only="command")
-    truth: str | None = operand(
-        None,
-        "where truth (JSON) and, when sealed, salt go",
-        metavar="PATH",
-        writes=JSON,
-        only="command",
-    )
-    person: int = operand(0, "whose hand: 0 the average, 1... others", low=0, high=2**63 - 1, parse=natural)
-    sizes: bool = operand(True, "state each effect's size in newtons, which solves without it too", rare=True)
-    ideal: bool = operand(False, "also what the ideal object would answer", only="python")
-    pictures: str | None = operand(
-        None,
-        "also draw the path, the force and every press beside the ideal object",
-        metavar="PNG",
-        writes=PNG,
-        only="command",
-    )
-    report: str | None = report_operand(
-        "write the object to be turned, and every touch beside the ideal object's, as one HTML page"
-    )
-    workers: int | None = operand(
-        None,
-        "processes that solve touches; None: one a core",
-        low=1,
-        high=2**63 - 1,
-        parse=natural,
-        rare=True,
-    )
-    seed: int = seed_operand()
 
 
 def effects_from(given: Mapping[str, float] | Sequence[str] | None) -> dict[str, float] | None:
@@ -95,36 +46,68 @@ def effects_from(given: Mapping[str, float] | Sequence[str] | None) -> dict[str,
     return out
 
 
-def _answer(result: Simulation, asked: SimulateOperands, out: Output) -> int:
-    from palpate.scenes.laboratory.sealing import write_sealed
-
-    path = result.recording.path
-    if asked.seal:
-        path = write_sealed(str(asked.save), result.recording, result.truth, str(asked.truth))
-    elif asked.truth:
-        emit_json({"truth": result.truth}, asked.truth)
-    if asked.pictures:
-        from palpate.show.simulation import simulation_figure
-
-        with atomic_file(asked.pictures, PNG) as picture:
-            simulation_figure(result).savefig(picture, dpi=110, format="png")
-        out.say(f"pictures: {asked.pictures}")
-    if asked.report:
-        out.say(f"report: {result.report(asked.report)}")
-    summary: dict[str, Any] = {**result.as_json(), "recording": str(path), "sealed": bool(asked.seal)}
-    if asked.seal:
-        del summary["truth"]
-    words = result.lines()
-    out.say(*(words[:1] if asked.seal else words), f"written to {path}")
-    say_next(result, out)
-    out.json(summary)
-    return 0
-
-
-@operation(
-    SimulateOperands, SimulateOptions, HandOptions, often="young_modulus_pa presses protocol", answer=_answer
-)
-def simulate(asked: SimulateOperands, call: Call) -> Simulation:
+@operation(common="young_modulus_pa presses protocol")
+def simulate(
+    phantom: Annotated[
+        str | Path | Phantom,
+        argument(f"{', '.join(PHANTOMS)}, or a surface file", metavar="PHANTOM", reads=True),
+    ],
+    effects: Annotated[
+        Mapping[str, float] | None,
+        option(
+            "an effect and its strength (repeatable; docs/reference/strengths.md: what 1 is; 0 leaves it "
+            f"out): {', '.join(REGISTRY)}",
+            flag="--effect",
+            metavar="NAME=STRENGTH",
+            count="repeat",
+        ),
+    ] = None,
+    *,
+    save: Annotated[
+        str | Path | None, save_option("recording to write (.csv.gz, .csv)", "REC", SAMPLES, needed=True)
+    ] = None,
+    seal: Annotated[bool, option("withhold the truth; needs --truth", only="command")] = False,
+    truth: Annotated[
+        str | None,
+        option("where truth (JSON) and, when sealed, salt go", metavar="PATH", writes=JSON, only="command"),
+    ] = None,
+    person: Annotated[
+        int, option("whose hand: 0 the average, 1... others", low=0, high=2**63 - 1, parse=natural)
+    ] = 0,
+    sizes: Annotated[
+        bool, option("state each effect's size in newtons, which solves without it too", advanced=True)
+    ] = True,
+    ideal: Annotated[bool, option("also what the ideal object would answer", only="python")] = False,
+    pictures: Annotated[
+        str | None,
+        option(
+            "also draw the path, the force and every press beside the ideal object",
+            metavar="PNG",
+            writes=PNG,
+            only="command",
+        ),
+    ] = None,
+    report: Annotated[
+        str | None,
+        report_option(
+            "write the object to be turned, and every touch beside the ideal object's, as one HTML page"
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        option(
+            "processes that solve touches; None: one a core",
+            low=1,
+            high=2**63 - 1,
+            parse=natural,
+            advanced=True,
+        ),
+    ] = None,
+    seed: Seed = 0,
+    options: SimulateOptions,
+    hand: Given[HandOptions],
+    call: Call,
+) -> Simulation:
     """The virtual laboratory: a person explores a phantom, and what a device would have read is written down.
 
     phantom: one of the names or a closed STL, PLY or VTU surface, m. effects: name to strength; none is the
@@ -133,26 +116,66 @@ def simulate(asked: SimulateOperands, call: Call) -> Simulation:
     """
     from palpate.scenes.laboratory.curves import Solving
     from palpate.scenes.laboratory.hand import cohort_hand
+    from palpate.scenes.laboratory.sealing import write_sealed
     from palpate.scenes.laboratory.session import Staging
     from palpate.scenes.laboratory.simulate import simulate as simulated
     from palpate.scenes.phantoms import Phantom
     from palpate.scenes.phantoms import phantom as named
+    from palpate.show import next_lines
 
-    if asked.seal and not asked.truth:
+    if seal and not truth:
         raise OptionError("--seal withholds the truth: say with --truth PATH where it shall be kept")
-    if asked.seal and asked.report:
+    if seal and report:
         raise OptionError("--seal withholds the truth, which --report would tell: give one of them")
-    effects = effects_from(asked.effects)
-    thing = asked.phantom if isinstance(asked.phantom, Phantom) else named(asked.phantom)
+    acting = effects_from(effects)
+    thing = phantom if isinstance(phantom, Phantom) else named(phantom)
     with call.progress("simulate") as tell:
-        result = simulated(
+        made = simulated(
             thing,
-            effects,
-            call.of(SimulateOptions),
-            seed=asked.seed,
-            sizes=asked.sizes,
-            ideal=asked.ideal or asked.pictures is not None or asked.report is not None,
-            staging=Staging(dataclasses.replace(cohort_hand(asked.person), **call.values(HandOptions))),
-            solving=Solving(asked.workers, progress=tell),
+            acting,
+            options,
+            seed=seed,
+            sizes=sizes,
+            ideal=ideal or pictures is not None or report is not None,
+            staging=Staging(dataclasses.replace(cohort_hand(person), **hand)),
+            solving=Solving(workers, progress=tell),
         )
-    return result if asked.save is None or asked.seal else result.save(asked.save)
+    result = made if save is None or seal else made.save(save)
+    if truth and not seal:
+        emit_json({"truth": result.truth}, truth)
+    if pictures:
+        _draw(result, pictures)
+        call.out.say(f"pictures: {pictures}")
+    if report:
+        call.out.say(f"report: {result.report(report)}")
+    call.figures = {"sealed": bool(seal)}
+    if not seal:
+        call.then(f"written to {result.recording.path}")
+        return result
+    path = write_sealed(str(save), result.recording, result.truth, str(truth))
+    call.then(f"written to {path}")
+    call.following = [partial(next_lines, result)]
+    sealed: Any = _Sealed(result, path)
+    return sealed
+
+
+def _draw(result: Simulation, path: str) -> None:
+    from palpate.show.simulation import simulation_figure
+
+    with atomic_file(path, PNG) as picture:
+        simulation_figure(result).savefig(picture, dpi=110, format="png")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Sealed:
+    """A simulation that does not tell its truth."""
+
+    made: Simulation
+    path: Path
+
+    def lines(self) -> list[str]:
+        return self.made.lines()[:1]
+
+    def as_json(self) -> dict[str, Any]:
+        told = {key: value for key, value in self.made.as_json().items() if key != "truth"}
+        return {**told, "recording": str(self.path)}

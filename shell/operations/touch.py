@@ -12,11 +12,12 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from collections.abc import Mapping as Table
 from contextlib import ExitStack, closing
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -28,16 +29,16 @@ from palpate.mechanics.errors import DeviceError, OptionError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.names import unknown
 from palpate.mechanics.progress import Progress
-from palpate.operations._declare import Call, operand, operation
-from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
-from palpate.output import Output, progress_bar
+from palpate.operations._call import Call
+from palpate.operations._declare import EachOf, Given, argument, operation, option
+from palpate.operations._shared import SAMPLES, MeshFileOptions, Seed, given_scene, with_friction
+from palpate.output import progress_bar
 from palpate.render.options import RenderOptions
 from palpate.render.registry import names
-from palpate.render.support import SupportOptions
 from palpate.scenes.build import model_of
 from palpate.scenes.scene import Scene, load_scene, scene_names
 from palpate.scenes.virtual_presses import ExplorationOptions, explore
-from palpate.servo import SafetyOptions, ServoOptions, ServoReport
+from palpate.servo import ServoOptions, ServoReport
 from palpate.servo.started import StartedServo
 from palpate.warm_up import OF_A_TOUCH, OF_ITS_SERVO, warming_up
 from palpate.window.session import SessionOptions, TouchSession
@@ -48,44 +49,6 @@ if TYPE_CHECKING:
 POLL_S = 0.1
 DEFAULT = "demo"
 _NOT_RECORDED = "keep the touch, for reconstruct, compare and diagnose: --record REC.csv.gz"
-
-
-@dataclass(frozen=True)
-class TouchOperands:
-    """The scene, the device, the window."""
-
-    scene: str | None = operand(
-        None,
-        "what to touch; None: chosen in the window, without one demo",
-        metavar="MODEL_OR_SCENE",
-        positional=True,
-        count="?",
-        reads=True,
-    )
-    _: KW_ONLY
-    device: str | None = operand(
-        None, f"one of {', '.join(DEVICES)}; None: mouse; headless: simulated", metavar="NAME"
-    )
-    headless: bool = operand(False, "no window: all else is the same")
-    seconds: float | None = operand(None, "stop after this time; None: when the window closes", unit="s")
-    record: str | Path | None = operand(
-        None, "write the session as a recording (NAME.csv.gz)", metavar="REC", writes=SAMPLES
-    )
-    replay: str | None = operand(
-        None, "the recording that the device 'replay' plays", metavar="REC", reads=True
-    )
-    renderer: str | None = operand(None, f"one of {', '.join(names())}; None: the scene's", metavar="NAME")
-    beside: str | None = operand(
-        None,
-        "a second renderer, driven by the same tip, or 'none'; None: the scene's",
-        metavar="NAME",
-        rare=True,
-    )
-    screenshot: str | Path | None = operand(None, "save the window at its end", metavar="PNG", writes=PNG)
-    seed: int = seed_operand()
-    guide: Callable[[TouchSession], Guide] | None = operand(
-        None, "makes the guide of an exploration, for the window", only="python"
-    )
 
 
 @dataclass(frozen=True)
@@ -105,55 +68,118 @@ class ServoRun:
         report = self.report.text(sent=spec_of(self.device).has_force)
         return [f"{self.scene.title}: {self.renderer}, {self.device}", report, *recorded]
 
+    def as_json(self) -> dict[str, Any]:
+        """What the servo did, keys with units."""
+        return {"scene": self.scene.name, "device": self.device, "servo": self.report.as_dict()}
 
-def _answer(touched: ServoRun | None, asked: TouchOperands, out: Output) -> int:
+    def exit_code(self) -> int:
+        """0; raises DeviceError for what stopped it."""
+        if self.failure:
+            raise DeviceError(self.failure)
+        return 0
+
+
+@operation(common="young_modulus_pa unit friction max_force_n", progress=False)
+def touch(
+    scene: Annotated[
+        str | None,
+        argument(
+            "what to touch; None: chosen in the window, without one demo",
+            metavar="MODEL_OR_SCENE",
+            count="?",
+            reads=True,
+        ),
+    ] = None,
+    *,
+    device: Annotated[
+        str | None, option(f"one of {', '.join(DEVICES)}; None: mouse; headless: simulated", metavar="NAME")
+    ] = None,
+    headless: Annotated[bool, option("no window: all else is the same")] = False,
+    seconds: Annotated[
+        float | None, option("stop after this time; None: when the window closes", unit="s")
+    ] = None,
+    record: Annotated[
+        str | Path | None,
+        option("write the session as a recording (NAME.csv.gz)", metavar="REC", writes=SAMPLES),
+    ] = None,
+    replay: Annotated[
+        str | None, option("the recording that the device 'replay' plays", metavar="REC", reads=True)
+    ] = None,
+    renderer: Annotated[
+        str | None, option(f"one of {', '.join(names())}; None: the scene's", metavar="NAME")
+    ] = None,
+    beside: Annotated[
+        str | None,
+        option(
+            "a second renderer, driven by the same tip, or 'none'; None: the scene's",
+            metavar="NAME",
+            advanced=True,
+        ),
+    ] = None,
+    screenshot: Annotated[
+        str | Path | None, option("save the window at its end", metavar="PNG", writes=PNG)
+    ] = None,
+    seed: Seed = 0,
+    guide: Annotated[
+        Callable[[TouchSession], Guide] | None,
+        option("makes the guide of an exploration, for the window", only="python"),
+    ] = None,
+    file: Given[MeshFileOptions],
+    mapper: Given[MapperOptions],
+    render: RenderOptions,
+    servo: ServoOptions,
+    devices: Annotated[Table[str, Any], EachOf({name: options_of(name) for name in DEVICES})],
+    exploration: ExplorationOptions,
+    call: Call,
+) -> ServoRun | None:
+    """Open, touch, close; None where the window was closed before the touch began."""
+    name = device or ("simulated" if headless else "mouse")
+    _check(name, renderer, beside, seconds, replay, headless)
+    for word in servo.loosened:
+        print(f"palpate touch: {word}", file=sys.stderr)
+
+    def session_of(scene: Scene) -> SessionOptions:
+        second = beside or ("" if headless else scene.beside)
+        return SessionOptions(
+            renderer=renderer or scene.renderer,
+            beside="" if second == "none" else second,
+            render=with_friction(render, scene),
+            servo=servo,
+            recording=None if record is None else Path(record),
+            pictures=not headless,
+        )
+
+    with warming_up(OF_A_TOUCH) as compiling:  # while a person chooses, too
+        opening = _Opening(
+            device=name,
+            scene=partial(given_scene, said=file),
+            session_of=session_of,
+            choice=partial(device_choice, name, devices[name], exploration, replay, seed),
+            mapping=partial(_mapping, mapper, name),
+            record=record,
+            compiling=compiling,
+        )
+        if headless:
+            touched: ServoRun | None = _without(opening, scene or DEFAULT, seconds)
+        else:
+            picture = None if screenshot is None else Path(screenshot)
+            touched = _in_window(opening, scene, seconds, guide, picture)
     if touched is not None:
         follows = f"see what it holds: palpate check {touched.record}" if touched.record else _NOT_RECORDED
-        out.say(*touched.lines(), f"next: {follows}")
-        out.json({"scene": touched.scene.name, "device": touched.device, "servo": touched.report.as_dict()})
-        if touched.failure:
-            raise DeviceError(touched.failure)
-    return 0
+        call.following = [f"next: {follows}"]
+        call.exit_code = touched.exit_code
+    return touched
 
 
-@operation(
-    TouchOperands,
-    MeshFileOptions,
-    MapperOptions,
-    RenderOptions,
-    ServoOptions,
-    SupportOptions,
-    SafetyOptions,
-    *map(options_of, DEVICES),
-    ExplorationOptions,
-    often="young_modulus_pa unit friction max_force_n",
-    answer=_answer,
-    progress=False,
-)
-def touch(asked: TouchOperands, call: Call) -> ServoRun | None:
-    """Open, touch, close; None where the window was closed before the touch began."""
-    name = asked.device or ("simulated" if asked.headless else "mouse")
-    _check(asked, name)
-    servo_options = call.of(
-        ServoOptions, safety=call.of(SafetyOptions), support_plane=call.of(SupportOptions)
-    )
-    for word in servo_options.loosened:
-        print(f"palpate touch: {word}", file=sys.stderr)
-    with warming_up(OF_A_TOUCH) as compiling:  # while a person chooses, too
-        opening = _Opening(asked, call, name, servo_options, compiling)
-        return _in_window(opening) if not asked.headless else _without(opening)
-
-
-def _without(opening: _Opening) -> ServoRun:
+def _without(opening: _Opening, name: str, seconds: float | None) -> ServoRun:
     """Touch without a window."""
-    asked = opening.asked
-    scene = opening.scene(asked.scene or DEFAULT)
+    scene = opening.scene(name)
     with ExitStack() as stack:
         servo = stack.enter_context(StartedServo(OF_ITS_SERVO))
         with progress_bar("touch") as bar:
             session, until = opening.session(stack, servo, scene, None, bar)
         session.enable()
-        _wait(session, until if asked.seconds is None else asked.seconds)
+        _wait(session, until if seconds is None else seconds)
         return opening.touched(session, scene)
 
 
@@ -161,33 +187,23 @@ def _without(opening: _Opening) -> ServoRun:
 class _Opening:
     """What was asked for, of whichever scene. compiling: waits for the loop's kernels."""
 
-    asked: TouchOperands
-    call: Call
     device: str
-    servo: ServoOptions
+    scene: Callable[[str], Scene]
+    session_of: Callable[[Scene], SessionOptions]
+    choice: Callable[[Model, PoseChannel | None], tuple[DeviceChoice, float | None]]
+    mapping: Callable[[Scene, Model], Mapping | None]
+    record: str | Path | None
     compiling: Callable[[], object]
-
-    def scene(self, name: str) -> Scene:
-        return given_scene(name, self.call)
 
     def session(
         self, stack: ExitStack, servo: StartedServo, scene: Scene, channel: PoseChannel | None, tell: Progress
     ) -> tuple[TouchSession, float | None]:
         """A started session, which the stack closes, and when its device will have done (s)."""
-        asked, call = self.asked, self.call
         model = model_of(scene, lambda stage, share: tell(stage, 0.4 * share))
         if channel is not None:
             channel.write(time.perf_counter(), tuple(_above(model)))
-        device, until = device_choice(asked, call, self.device, model, channel)
-        options = SessionOptions(
-            renderer=asked.renderer or scene.renderer,
-            beside=_beside(asked, scene),
-            render=with_friction(call.of(RenderOptions), scene),
-            servo=self.servo,
-            recording=None if asked.record is None else Path(asked.record),
-            pictures=not asked.headless,
-        )
-        mapping = _mapping(call, self.device, scene, model)
+        device, until = self.choice(model, channel)
+        options, mapping = self.session_of(scene), self.mapping(scene, model)
 
         def compiled() -> None:
             if options.renderer == "fem":
@@ -204,15 +220,20 @@ class _Opening:
     def touched(self, session: TouchSession, scene: Scene) -> ServoRun:
         """What was done."""
         report, failure = session.report(), session.servo.failure
-        return ServoRun(scene, self.device, session.renderer_name, report, self.asked.record, failure)
+        return ServoRun(scene, self.device, session.renderer_name, report, self.record, failure)
 
 
-def _in_window(opening: _Opening) -> ServoRun | None:
+def _in_window(
+    opening: _Opening,
+    asked: str | None,
+    seconds: float | None,
+    guided: Callable[[TouchSession], Guide] | None,
+    picture: Path | None,
+) -> ServoRun | None:
     """A window from the first moment on, where a scene is chosen and which shows how the preparation comes
     along; then the touch, of one scene after the other. None where a person closes it before."""
-    asked = opening.asked
     # who says how long is not there to choose
-    name = asked.scene or (None if asked.seconds is None and asked.guide is None else DEFAULT)
+    name = asked or (None if seconds is None and guided is None else DEFAULT)
     chosen = None if name is None else opening.scene(name)
     while True:
         with ExitStack() as stack:
@@ -232,11 +253,9 @@ def _in_window(opening: _Opening) -> ServoRun | None:
                 print(f"palpate touch: {error}", file=sys.stderr)
                 return None
             session.enable()
-            guide = None if asked.guide is None else asked.guide(session)
+            guide = None if guided is None else guided(session)
             window = TouchWindow(session, scene, channel, guide=guide)
-            seconds = until if asked.seconds is None else asked.seconds
-            picture = None if asked.screenshot is None else Path(asked.screenshot)
-            window.run(seconds, screenshot=picture, shown=waiting.close)
+            window.run(until if seconds is None else seconds, screenshot=picture, shown=waiting.close)
             if not window.another:
                 return opening.touched(session, scene)
         chosen = None
@@ -248,19 +267,26 @@ def _gallery() -> list[Scene]:
     return [load_scene(name) for name in (DEFAULT, *there)]
 
 
-def _check(asked: TouchOperands, name: str) -> None:
+def _check(
+    name: str,
+    renderer: str | None,
+    beside: str | None,
+    seconds: float | None,
+    replay: str | None,
+    headless: bool,
+) -> None:
     for value, allowed, what in (
         (name, tuple(DEVICES), "device"),
-        (asked.renderer, names(), "renderer"),
-        (asked.beside, (*names(), "none"), "renderer"),
+        (renderer, names(), "renderer"),
+        (beside, (*names(), "none"), "renderer"),
     ):
         if value is not None and value not in allowed:
             raise OptionError(unknown(value, what, allowed))
-    if asked.seconds is not None and not asked.seconds > 0:
-        raise OptionError(f"--seconds is {asked.seconds}; it must be greater than 0")
-    if name == "replay" and not asked.replay:
+    if seconds is not None and not seconds > 0:
+        raise OptionError(f"--seconds is {seconds}; it must be greater than 0")
+    if name == "replay" and not replay:
         raise OptionError("the device 'replay' plays a recording: name it with --replay REC")
-    if asked.headless:
+    if headless:
         if name == "mouse":
             raise DeviceError("the mouse needs the window: drop --headless, or use --device simulated")
     elif sys.platform.startswith("linux") and not (
@@ -273,39 +299,33 @@ def _check(asked: TouchOperands, name: str) -> None:
 
 
 def device_choice(
-    asked: TouchOperands, call: Call, name: str, model: Model | None, channel: PoseChannel | None
+    name: str,
+    options: Any,
+    exploration: ExplorationOptions,
+    replay: str | None,
+    seed: int,
+    model: Model | None,
+    channel: PoseChannel | None,
 ) -> tuple[DeviceChoice, float | None]:
     """The device for the servo process to make, and when it will have done (s), None for never."""
-    options: Any = call.of(options_of(name))
     if channel is not None:
         return DeviceChoice(name, {"channel": str(channel.path), "options": options}), None
     if name == "replay":
-        recording = str(Path(str(asked.replay)).resolve())
+        recording = str(Path(str(replay)).resolve())
         return DeviceChoice(name, {"recording": recording, "options": options}), None
     if name == "simulated":
         assert model is not None
-        path, _ = explore(
-            model,
-            call.of(ExplorationOptions),
-            hand_stiffness_n_per_m=options.stiffness_n_per_m,
-            seed=asked.seed,
-        )
-        keywords = {"options": options, "intention": path, "seed": asked.seed}
+        path, _ = explore(model, exploration, hand_stiffness_n_per_m=options.stiffness_n_per_m, seed=seed)
+        keywords = {"options": options, "intention": path, "seed": seed}
         return DeviceChoice(name, keywords), path.duration_s + 2.0
     return DeviceChoice(name, {"options": options}), None
 
 
-def _beside(asked: TouchOperands, scene: Scene) -> str:
-    if asked.beside is not None:
-        return "" if asked.beside == "none" else asked.beside
-    return "" if asked.headless else scene.beside
-
-
-def _mapping(call: Call, name: str, scene: Scene, model: Model) -> Mapping | None:
+def _mapping(given: Table[str, Any], name: str, scene: Scene, model: Model) -> Mapping | None:
     """None, the identity, for devices that live in the scene's frame already."""
     if name in ("mouse", "simulated", "replay"):
         return None
-    options = MapperOptions(**{**vars(scene.mapper), **call.values(MapperOptions)})
+    options = MapperOptions(**{**vars(scene.mapper), **given})
     return Mapping.from_options(options, centre_m=_above(model), rate=spec_of(name).control == "rate")
 
 

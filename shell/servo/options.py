@@ -39,7 +39,7 @@ class ServoOptions:
     tip_offsets_m: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
     support_plane: SupportOptions = field(default_factory=SupportOptions)
     safety: SafetyOptions = field(default_factory=SafetyOptions)
-    passivity: PassivityOptions = field(default_factory=PassivityOptions)
+    passivity: PassivityOptions = field(default_factory=PassivityOptions, metadata={"flags": False})
 
     def __post_init__(self) -> None:
         check_ranges(self)

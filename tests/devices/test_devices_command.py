@@ -10,9 +10,7 @@ import pytest
 from palpate.cli import main
 from palpate.devices.haply import HaplyOptions
 from palpate.devices.registry import DEVICES, options_of
-from palpate.operations._declare import Call
-from palpate.operations._run import parser_of
-from palpate.operations.touch import TouchOperands, device_choice
+from palpate.operations._run import command_operation, parser_of
 
 from .fake_inverse import FakeInverse
 
@@ -56,7 +54,6 @@ def test_every_option_of_every_driver_is_a_flag_of_its_own() -> None:
     for device in DEVICES:
         assert {field.name for field in dataclasses.fields(options_of(device))} <= set(names)
     given = parser.parse_args(["block", "--haply-uri", "ws://elsewhere:1", "--ffb-full-scale", "4"])
-    asked, call = TouchOperands(), Call(vars(given))
-    choice, _ = device_choice(asked, call, "haply", None, None)
-    assert choice.options["options"] == HaplyOptions(uri="ws://elsewhere:1")
-    assert device_choice(asked, call, "pid-ffb", None, None)[0].options["options"].full_scale_n == 4.0
+    arriving = command_operation("touch")[0].arriving(vars(given))["devices"]
+    assert arriving["haply"] == HaplyOptions(uri="ws://elsewhere:1")
+    assert arriving["pid-ffb"].full_scale_n == 4.0

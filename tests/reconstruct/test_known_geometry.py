@@ -12,7 +12,6 @@ from palpate.mechanics.compliance.sites import SURFACE_EDGE_M
 from palpate.mechanics.errors import ContactError, OptionError, SurfaceError
 from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.shape.refine import refined_near_surface, typical_edge
-from palpate.operations._declare import Call
 from palpate.operations._shared import given_model
 from palpate.reconstruction.geometry.known_shape import place
 from palpate.reconstruction.geometry.slab import flat_mesh
@@ -145,7 +144,7 @@ def test_the_modulus_of_a_half_space_needs_no_tracing():
 def test_a_surfaces_file_is_the_model_of_a_recording(tmp_path):
     """Of compare --model and of diagnose: owners of a CAD model were refused."""
     trimesh.creation.box(extents=(80, 80, 40)).export(tmp_path / "part.stl")
-    given = Call({"young_modulus_pa": 9e3, "unit": "mm"})
+    given = {"young_modulus_pa": 9e3, "unit": "mm"}
     scene = given_model(str(tmp_path / "part.stl"), given)
     assert isinstance(scene, Scene) and scene.kind == "mesh"
     assert (scene.young_modulus_pa, scene.unit) == (9e3, "mm")

@@ -15,7 +15,8 @@ import pytest
 from palpate import cli
 from palpate.mechanics.kernel_cache import ROOMS, sources
 from palpate.mechanics.options import option
-from palpate.operations._declare import Call, operation
+from palpate.operations._call import Call
+from palpate.operations._declare import operation
 from palpate.operations._list import commands
 from palpate.operations._to_argparse import add_operation
 from palpate.output import emit_json
@@ -30,20 +31,15 @@ class SampleOptions:
     repeats: int = option(3, "how many")
 
 
-@dataclass(frozen=True)
-class NoOperands:
-    pass
-
-
-@operation(NoOperands, SampleOptions, json=False)
-def sample(asked: NoOperands, call: Call) -> SampleOptions:
-    return call.of(SampleOptions)
+@operation(json=False)
+def sample(*, options: SampleOptions) -> SampleOptions:
+    return options
 
 
 def parse(*words: str) -> SampleOptions:
     parser = argparse.ArgumentParser()
     add_operation(parser, sample.operation)
-    return sample.operation.run(vars(parser.parse_args(words)))[1]
+    return sample.operation.run(vars(parser.parse_args(words)), Call())
 
 
 def test_options_become_flags_and_come_back():

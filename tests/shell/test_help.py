@@ -44,7 +44,7 @@ def test_help_shows_what_most_use_and_all_that_was_promised(name):
     parser = parser_of(name)
     short, whole = parser.format_help(), getattr(parser, "format_all_help", parser.format_help)()
     flags = {f: a for a in parser._actions for f in a.option_strings}
-    shown = {a for a in flags.values() if not getattr(a, "rare", False)}
+    shown = {a for a in flags.values() if not getattr(a, "advanced", False)}
     assert len(shown) <= 16, "ten of its own, and --help, --help-all, --json, --seed, what was promised"
     for flag in CONTRACT.get(name, "").split() + ["--seed"] * (name in RANDOM):
         assert flags[flag] in shown and flag in short
@@ -53,7 +53,7 @@ def test_help_shows_what_most_use_and_all_that_was_promised(name):
     assert not [f for f in hidden if re.search(rf"(?<![\w-]){f}(?![\w-])", short.partition("options:")[2])]
     assert bool(hidden) == (f"more options: palpate {name} --help-all" in short)
     operation, _ = command_operation(name)
-    assert operation.often <= {f for f in operation.fields if f not in operation.own}
+    assert operation.common <= {f for f in operation.fields if f not in operation.own}
 
 
 def test_help_all_ends_well(capsys):

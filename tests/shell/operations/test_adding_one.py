@@ -16,22 +16,16 @@ FILE = '''
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass
+from typing import Annotated
 
-from palpate.mechanics.options import option
-from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.mechanics import options
+from palpate.operations._declare import argument, operation, option
 
 
 @dataclass(frozen=True)
 class SpringOptions:
-    stiffness_n_per_m: float = option(200.0, "of the spring", unit="N/m", low=1.0, high=1e4)
-
-
-@dataclass(frozen=True)
-class StretchOperands:
-    force_n: float = operand(REQUIRED, "that pulls", unit="N", metavar="FORCE", positional=True)
-    _: KW_ONLY
-    twice: bool = operand(False, "two springs in a row")
+    stiffness_n_per_m: float = options.option(200.0, "of the spring", unit="N/m", low=1.0, high=1e4)
 
 
 @dataclass(frozen=True)
@@ -45,11 +39,16 @@ class Stretched:
         return {"by_m": self.by_m}
 
 
-@operation(StretchOperands, SpringOptions)
-def stretch(asked: StretchOperands, call: Call) -> Stretched:
+@operation()
+def stretch(
+    force_n: Annotated[float, argument("that pulls", unit="N", metavar="FORCE")],
+    *,
+    twice: Annotated[bool, option("two springs in a row")] = False,
+    spring: SpringOptions,
+) -> Stretched:
     """How far a spring gives, m. Raises OptionError."""
-    by = asked.force_n / call.of(SpringOptions).stiffness_n_per_m
-    return Stretched(2 * by if asked.twice else by)
+    by = force_n / spring.stiffness_n_per_m
+    return Stretched(2 * by if twice else by)
 '''
 
 

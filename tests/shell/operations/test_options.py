@@ -162,7 +162,7 @@ def test_signature_help_and_list_show_every_option_with_its_default(name):
 def test_no_two_options_of_one_operation_share_a_name(name):
     """But for a seed that a room has too, which is the operation's."""
     operation = operation_of(name)
-    names = [f.name for kind in (operation.operands, *operation.kinds) for f in declared(kind)]
+    names = [*operation.own, *(f.name for kind in operation.kinds for f in declared(kind))]
     twice = {n for n in names if names.count(n) > 1}
     assert twice <= {"seed", "young_modulus_pa"}
 

@@ -14,7 +14,7 @@ import palpate as pp
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.progress import silent
 from palpate.operations import diagnose
-from palpate.operations._simulators import Ran, mended, run_along, told
+from palpate.operations._simulators import Ran, mended_by, run_along, told
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.render.options import RenderOptions
 
@@ -23,11 +23,11 @@ from .conftest import PLACES_M
 
 
 def test_what_mends_goes_on_top_of_what_was_asked():
-    assert mended("documented", "timestep_s=0.002", "best") == ("best", "timestep_s=0.002")
-    assert mended("documented", "a=1,b=2", "b=3, best") == ("best", "a=1,b=3")
-    assert mended("best", "", "solref_s=0.004") == ("best", "solref_s=0.004")
+    assert mended_by("documented", "timestep_s=0.002", "best") == ("best", "timestep_s=0.002")
+    assert mended_by("documented", "a=1,b=2", "b=3, best") == ("best", "a=1,b=3")
+    assert mended_by("best", "", "solref_s=0.004") == ("best", "solref_s=0.004")
     with pytest.raises(OptionError, match="--mended 'better' must be KEY=VALUE"):
-        mended("best", "", "better")
+        mended_by("best", "", "better")
 
 
 def test_a_long_run_says_how_long_and_what_fewer_presses_take():

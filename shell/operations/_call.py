@@ -1,0 +1,94 @@
+"""One call of an operation, and what its command does with the result."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from palpate.mechanics.progress import Progress, silent
+from palpate.output import Output, progress_bar
+
+Step = str | Callable[[], Sequence[str]]
+"""What a command says: a line, or what makes lines when their turn comes."""
+
+
+@dataclass
+class Call:
+    """One call of an operation, beside its operands. wanted: whether or where progress goes; command: from
+    the command line; out: what a command says on the way, silent in a Python call.
+
+    What a command does with the result comes after: it says the result's lines (unless `said`, on the way),
+    then `steps`, then `following` (None: what the result's kind advises), writes the result's JSON with
+    `figures`, and ends with `exit_code`, or with what that gives as a function. A Python call does none of
+    it.
+    """
+
+    wanted: bool | Progress = True
+    command: bool = False
+    out: Output = dataclasses.field(default_factory=lambda: Output("-"))
+    steps: list[Step] = dataclasses.field(default_factory=list)
+    following: Sequence[Step] | None = None
+    said: bool = False
+    figures: dict[str, Any] = dataclasses.field(default_factory=dict)
+    exit_code: int | Callable[[], int] = 0
+
+    def then(self, *steps: Step) -> None:
+        """Say this after the result's lines."""
+        self.steps += steps
+
+    def then_save(self, result: Any, path: Any) -> None:
+        """Save the result after its lines, where that was asked for."""
+
+        def saved() -> list[str]:
+            result.save(path)
+            return [f"written: {path}"]
+
+        if path is not None:
+            self.then(saved)
+
+    def then_report(self, result: Any, page: Any, *more: Any) -> None:
+        """Write the result's page after its lines, where one was asked for."""
+        if page is not None:
+            self.then(lambda: [report_words(result.report(page, *more))])
+
+    @contextmanager
+    def progress(self, label: str) -> Iterator[Progress]:
+        """Where progress goes: to a callable, to a bar on a terminal, or nowhere."""
+        if callable(self.wanted):
+            yield self.wanted
+        elif self.wanted:
+            with progress_bar(label) as bar:
+                yield bar
+        else:
+            yield silent
+
+    def answer(self, result: Any) -> int:
+        """What a command does with the result; its exit code. A result says itself by `lines` and `as_json`;
+        text is its own line, and None is nothing to say."""
+        if result is None:
+            return 0
+        from palpate.show import next_lines
+
+        says = hasattr(result, "lines")
+        if not self.said:
+            self._say(result.lines() if says else [result] if isinstance(result, str) else [])
+        self._say(self.steps)
+        self._say(next_lines(result) if self.following is None else self.following)
+        self.out.json({**(result.as_json() if says else {}), **self.figures})
+        return self.exit_code() if callable(self.exit_code) else self.exit_code
+
+    def _say(self, steps: Sequence[Step]) -> None:
+        for step in steps:
+            self.out.say(*([step] if isinstance(step, str) else step()))
+
+
+def report_words(page: Path) -> str:
+    """Where a page is; and the folder beside it, where its pictures were written as files too."""
+    folder = page.with_suffix("")
+    also = f" (its pictures as files too: {folder}{os.sep})" if any(folder.glob("*.png")) else ""
+    return f"report: {page}{also}"
