@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks._simulated_flaws import MODULUS_PA, NOISE_N, RADIUS_M, Block, Given, Layout
-from palpate.diagnosis.other_simulator.stated import Stated
+from palpate.diagnosis.other_simulator.declared_parameters import Stated
 from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.disk.writing import atomic_file
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Tool
 from palpate.mechanics.progress import silent
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
@@ -250,7 +250,7 @@ class Runs:
         model: Model = dataclasses.replace(
             self.model,
             mesh=squeezed_mesh(simulation.cells),
-            material=Material(simulation.modulus_pa, simulation.poisson),
+            material=ObjectMaterial(simulation.modulus_pa, simulation.poisson),
             tool=Tool(simulation.radius_m),
         )
         said = ",".join(f"{key}={value!r}" for key, value in simulation.settings.items())

@@ -16,7 +16,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from palpate.mechanics.elastic.solver import Solver
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import nearest_nodes
@@ -71,7 +71,7 @@ class Palpate(Peer):
 
         low = mesh.points[mesh.fixed].mean(axis=0)
         self.model = Model(
-            mesh.quadratic(), Material(young_pa, poisson), Support(low, np.array([0.0, 0.0, 1.0])),
+            mesh.quadratic(), ObjectMaterial(young_pa, poisson), Support(low, np.array([0.0, 0.0, 1.0])),
             Tool(radius_m), mesh_size_m=float(np.cbrt(8.5 * mesh.volumes.mean())),
         )  # fmt: skip
         self.renderer = render.create("fem", self.model)
@@ -215,7 +215,7 @@ class Newton(Peer):
 
         low = mesh.points[mesh.fixed].mean(axis=0)
         support = Support(low, np.array([0.0, 0.0, 1.0]))
-        model = Model(mesh, Material(young_pa, poisson), support, Tool(radius_m), mesh_size_m=0.01)
+        model = Model(mesh, ObjectMaterial(young_pa, poisson), support, Tool(radius_m), mesh_size_m=0.01)
         self.adapter = Adapter(model, RenderOptions(simulator_set=NEWTON_NUMBERS), 0.5)
         self.radius_m = radius_m
         far = mesh.points.max(axis=0) + 1.0

@@ -16,7 +16,7 @@ from palpate.devices.virtual_hand import SPEC
 from palpate.mechanics.disk.scratch import cache_folder
 from palpate.mechanics.kernels import kept
 from palpate.mechanics.model.files import read_model, write_model
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.render.passivity import PassivityOptions, passivity_parameters
 from palpate.render.scene import in_the_air
@@ -68,7 +68,7 @@ def block_model(touchable: int) -> Model:
     low = mesh.points.min(axis=0)
     return Model(
         mesh=mesh,
-        material=Material(30e3, 0.49),
+        material=ObjectMaterial(30e3, 0.49),
         support=Support(low, np.array([0.0, 0.0, 1.0])),
         tool=Tool(TIP_RADIUS_M),
         mesh_size_m=float(np.cbrt(mesh.volumes.mean() * 8.5)),

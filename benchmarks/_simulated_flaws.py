@@ -17,9 +17,9 @@ from scipy.signal import lfilter
 
 from palpate.mechanics.compliance.sites import touch_sites
 from palpate.mechanics.contact.touch import forces_at
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.presses.cutting import FoundPresses, cut
+from palpate.mechanics.presses.segmentation import FoundPresses, segment_recording
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.shape.tetmesh import box_mesh
 
@@ -147,9 +147,12 @@ class Block:
         onset = np.array([self.t[p.rows][np.argmax(p.into > 0)] for p in self.presses])
         peak = np.array([self.t[p.rows][np.argmax(p.into)] for p in self.presses])
         normal = self.normals[place]
-        table = cut(recording, FoundPresses(onset, peak, self.points[place] + RADIUS_M * normal, normal))
+        table = segment_recording(
+            recording, FoundPresses(onset, peak, self.points[place] + RADIUS_M * normal, normal)
+        )
         model = Model(
-            self.mesh, Material(MODULUS_PA, self.layout.poisson), Support(np.zeros(3), np.array([0, 0, 1.0])),
+            self.mesh, ObjectMaterial(MODULUS_PA, self.layout.poisson),
+            Support(np.zeros(3), np.array([0, 0, 1.0])),
             Tool(RADIUS_M), mesh_size_m=self.layout.size_m[0] / 6, presses=table,
         )  # fmt: skip
         return recording, model

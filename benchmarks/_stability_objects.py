@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
 from palpate.devices.impedance import HandImpedance
 from palpate.devices.virtual_hand import SPEC
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.render.base import Renderer
@@ -45,7 +45,7 @@ def dome() -> Model:
     bent = np.stack([x, y, z], axis=1)
     return Model(
         mesh=TetMesh(bent, mesh.tetrahedra, mesh.fixed, mesh.touchable),
-        material=Material(MODULI_PA[0], 0.49),
+        material=ObjectMaterial(MODULI_PA[0], 0.49),
         support=Support(np.array([0.0, 0.0, -SIZE_M[2]]), np.array([0.0, 0.0, 1.0])),
         tool=Tool(TIP_RADIUS_M),
         mesh_size_m=0.01,

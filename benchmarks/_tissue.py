@@ -14,7 +14,7 @@ import numpy as np
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites, touch_solver
 from palpate.mechanics.contact.touch import forces_at
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.making import PathErrors, of_paths
 from palpate.mechanics.presses.table import Presses
@@ -79,7 +79,7 @@ def tissue(
         normals, tip_radius_m=tip, sample_rate_hz=RATE_HZ, errors=PathErrors(touch_error_m, noise),
     )  # fmt: skip
     model = Model(
-        coarse.quadratic(), Material(modulus, NU), Support(np.zeros(3), UP), Tool(tip), COARSE_M,
+        coarse.quadratic(), ObjectMaterial(modulus, NU), Support(np.zeros(3), UP), Tool(tip), COARSE_M,
         presses=presses,
     )  # fmt: skip
     drawn = {"spacing_m": spacing, "height_m": height, "length_m": length, "tip_m": tip, "noise_n": noise}

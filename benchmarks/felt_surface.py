@@ -21,7 +21,7 @@ from benchmarks.timing import table
 from palpate.mechanics.compliance.compression import own_blocks
 from palpate.mechanics.compliance.sites import patch_width, touch_solver
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.flat_foot import Standing
 from palpate.mechanics.shape.nearest import sample
@@ -112,7 +112,7 @@ def forces(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray
 def standing(mesh: TetMesh, nu: float = NU, dent_law: str = "linear") -> Model:
     """The model of a mesh that stands on z = 0."""
     return Model(
-        mesh=mesh.quadratic(), material=Material(MODULUS_PA, nu, dent_law=dent_law),
+        mesh=mesh.quadratic(), material=ObjectMaterial(MODULUS_PA, nu, dent_law=dent_law),
         support=Support(np.zeros(3), _UP), tool=Tool(TIP_M), mesh_size_m=0.01,
     )  # fmt: skip
 

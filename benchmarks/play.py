@@ -26,7 +26,7 @@ from palpate.mechanics.effects.base import Scope
 from palpate.mechanics.effects.finite_strain import EFFECT as STRAIN
 from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
 from palpate.mechanics.effects.registry import effect, effects
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.recording.recording import Recording
@@ -85,7 +85,7 @@ def recorded(case: Case) -> tuple[Recording, Model]:
     mesh = box_mesh((4, 4, 3), (0.08, 0.08, 0.04))
     mesh = replace(mesh, points=mesh.points @ turn.T).quadratic()
     model = Model(
-        mesh=mesh, material=Material(MODULUS_PA, NU), support=Support(np.zeros(3), turn[:, 2]),
+        mesh=mesh, material=ObjectMaterial(MODULUS_PA, NU), support=Support(np.zeros(3), turn[:, 2]),
         tool=Tool(TIP_M), mesh_size_m=0.02,
     )  # fmt: skip
     around = (-0.02, 0.0, 0.02)

@@ -36,10 +36,10 @@ from benchmarks._simulated_flaws import FLAWS, Block, Flaw, Given, simulated
 from benchmarks._simulated_scores import figures_of, print_cases
 from benchmarks.timing import table
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions
+from palpate.diagnosis.other_simulator.declared_parameters import KEYS, Stated
 from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions
 from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import SimulatedGap
-from palpate.diagnosis.other_simulator.stated import KEYS, Stated
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.errors import OptionError

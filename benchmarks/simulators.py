@@ -28,7 +28,7 @@ from benchmarks.evidence import Figure
 from benchmarks.felt_surface import meshed
 from benchmarks.timing import table
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.progress import silent
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
@@ -319,7 +319,7 @@ def _draw(ax: Any, rows: list[dict[str, Any]]) -> None:
 
 def _model(mesh: TetMesh, radius_m: float, size_m: float) -> Model:
     low = mesh.points[mesh.fixed].mean(axis=0)
-    return Model(mesh, Material(YOUNG_PA, POISSON), Support(low, UP), Tool(radius_m), size_m)
+    return Model(mesh, ObjectMaterial(YOUNG_PA, POISSON), Support(low, UP), Tool(radius_m), size_m)
 
 
 def _half_space(aside_m: float = 0.0) -> Case:

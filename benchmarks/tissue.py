@@ -21,7 +21,7 @@ from benchmarks._robot_tissue import RobotTissue, robot_tissue
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.diagnosis.compare.models import HOMOGENEOUS, MODELS, RIVALS, predicted, prepare, rms
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.output import progress_bar
@@ -75,7 +75,11 @@ def _slab(made: RobotTissue) -> Model:
     mesh = TetMesh(box.points + middle, box.tetrahedra, box.fixed, box.touchable).quadratic()
     up = np.array([0.0, 0.0, 1.0])
     return Model(
-        mesh, Material(made.modulus_pa, 0.49), Support(np.zeros(3), up), Tool(made.tip_radius_m), _EDGE_M
+        mesh,
+        ObjectMaterial(made.modulus_pa, 0.49),
+        Support(np.zeros(3), up),
+        Tool(made.tip_radius_m),
+        _EDGE_M,
     )
 
 

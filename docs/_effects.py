@@ -25,7 +25,7 @@ from palpate.diagnosis.forward.prediction import Forward
 from palpate.mechanics.compliance.pressed_places import Places, solve_places
 from palpate.mechanics.effects.registry import NAMES, effect
 from palpate.mechanics.frames import tangents
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.shape.tetmesh import box_mesh
@@ -139,7 +139,9 @@ class Block:
         """All four places."""
         mesh = box_mesh((10, 10, 5), (0.1, 0.1, 0.05))
         support = Support(np.zeros(3), np.array([0, 0, 1.0]))
-        model = Model(mesh, Material(MODULUS_PA, NU), tool=Tool(TIP_M), support=support, mesh_size_m=0.01)
+        model = Model(
+            mesh, ObjectMaterial(MODULUS_PA, NU), tool=Tool(TIP_M), support=support, mesh_size_m=0.01
+        )
         frames = np.stack([np.stack([n, *tangents(n)]) for n in NORMALS])
         return solve_places(model, POINTS_M, NORMALS, frames)
 

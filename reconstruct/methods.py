@@ -90,7 +90,7 @@ class BodyToFit:
 
 
 @dataclass(frozen=True)
-class SolvedPresses:
+class FittedSolution:
     """Touched places that were solved, and the modulus by the tabulated law, before."""
 
     presses: ExactPresses
@@ -108,7 +108,7 @@ class ModulusOnMesh:
     sites: TouchSites | None = None
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
-    solved: SolvedPresses | None = None
+    solved: FittedSolution | None = None
 
     @property
     def misfit_n(self) -> np.ndarray | None:
@@ -156,7 +156,7 @@ class FiniteTip:
         fit, solved = fitted(), None
         if self.options.modulus.exact:
             clock.lap("modulus")
-            solved = SolvedPresses(_solve(body, mesh, sites, fit, part(progress, 0.8, 0.95), say), fit)
+            solved = FittedSolution(_solve(body, mesh, sites, fit, part(progress, 0.8, 0.95), say), fit)
             clock.lap("solved places")
             fit = fitted(solved.presses.factors)
             sites = dataclasses.replace(sites, factors=solved.presses.factors[fit.press.law])

@@ -14,7 +14,7 @@ from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.linear_range import linear_range
 from palpate.mechanics.disk.toml_text import plain
 from palpate.mechanics.errors import ContactError, OptionError
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
@@ -38,13 +38,13 @@ from palpate.reconstruction.geometry.stated import (
     stated_geometry,
 )
 from palpate.reconstruction.measured import Measured
-from palpate.reconstruction.methods import BY_NAME, BodyToFit, Method, ModulusOnMesh, Say, SolvedPresses
+from palpate.reconstruction.methods import BY_NAME, BodyToFit, FittedSolution, Method, ModulusOnMesh, Say
 from palpate.reconstruction.methods import ReconstructOptions as ReconstructOptions
 from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points, is_points
-from palpate.reconstruction.steps.s3_contacts.straightened import laid
+from palpate.reconstruction.steps.s3_contacts.sliding_presses import laid
 from palpate.reconstruction.steps.s4_surface import (
     CastPoints,
     Surface,
@@ -86,7 +86,7 @@ class Reconstruction(Result):
     paper_fit: PaperFit | None = None
     placed: Placed | None = None
     held_out: HeldOutErrors | None = None
-    exact: SolvedPresses | None = None
+    exact: FittedSolution | None = None
 
     @property
     def doubt(self) -> str:
@@ -279,7 +279,7 @@ def _concluded(
     tip_radius_m = measured.recording.tip_radius_m
     model = Model(
         mesh=fitted.mesh,
-        material=Material(fitted.modulus_pa, body.poisson_ratio, interval, dent_law=fitted.dent_law),
+        material=ObjectMaterial(fitted.modulus_pa, body.poisson_ratio, interval, dent_law=fitted.dent_law),
         support=Support(measured.boundary.support_point, measured.boundary.support_normal),
         tool=Tool(tip_radius_m),
         mesh_size_m=options.meshing.mesh_size_m,

@@ -14,7 +14,7 @@ from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 from palpate.reconstruction.steps.s3_contacts.left_out import off_surface, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points, is_points
-from palpate.reconstruction.steps.s3_contacts.straightened import laid
+from palpate.reconstruction.steps.s3_contacts.sliding_presses import laid
 from palpate.reconstruction.steps.s4_surface import cast
 
 _ANY = ContactOptions(least_palpations=1)

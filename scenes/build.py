@@ -23,7 +23,7 @@ from palpate.mechanics.disk.surface_files import surface_of
 from palpate.mechanics.disk.writing import atomic_folder
 from palpate.mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
 from palpate.mechanics.model.files import MODEL, read_model, write_model
-from palpate.mechanics.model.material import Ball, Material
+from palpate.mechanics.model.material import Ball, ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
@@ -155,7 +155,7 @@ def _from_phantom(scene: Scene, progress: Progress) -> Model:
     shape = phantom(scene.source)
     stood = Standing(shape.vertices, shape.faces, np.zeros(3), np.array([0.0, 0.0, 1.0]))
     about = {"method": "scene", "phantom": shape.name, "shape": shape.shape}
-    own = Material(
+    own = ObjectMaterial(
         young_modulus_pa=shape.young_modulus_pa,
         poisson_ratio=shape.poisson_ratio,
         inclusions=_balls(shape.regions if scene.inclusions is None else scene.inclusions),
@@ -177,14 +177,14 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
     return _built(
         scene,
         standing(surface, scene.up, scene.sink_m),
-        Material(DEFAULT_MODULUS_PA, USUAL_POISSON_RATIO, inclusions=_balls(scene.inclusions or ())),
+        ObjectMaterial(DEFAULT_MODULUS_PA, USUAL_POISSON_RATIO, inclusions=_balls(scene.inclusions or ())),
         {"method": "scene", "mesh": surface.name, "mended": ", ".join(surface.notes)},
         progress,
     )
 
 
 def _built(
-    scene: Scene, stood: Standing, own: Material, provenance: dict[str, str], progress: Progress
+    scene: Scene, stood: Standing, own: ObjectMaterial, provenance: dict[str, str], progress: Progress
 ) -> Model:
     """The model of a shape that stands in its own frame; own: its material where the scene says nothing."""
     # here, and below: a model that is kept or shipped is opened without loading what makes one

@@ -58,7 +58,7 @@ def warming_up(processes_of: Sequence[Sequence[str]] = BESIDE_ONE_ANOTHER) -> It
 def block_renderer(name: str = "fem") -> Any:
     """A renderer of a block that is condensed at once."""
     from palpate import render
-    from palpate.mechanics.model.material import Material
+    from palpate.mechanics.model.material import ObjectMaterial
     from palpate.mechanics.model.model import Model, Support, Tool
     from palpate.mechanics.presses.making import of_places
     from palpate.mechanics.presses.table import FITS
@@ -66,7 +66,9 @@ def block_renderer(name: str = "fem") -> Any:
 
     mesh = box_mesh((2, 2, 2), (_SIZE_M,) * 3).quadratic()
     up = np.array([0.0, 0.0, 1.0])
-    block = Model(mesh, Material(20e3, 0.49), Support(np.zeros(3), up), Tool(_TIP_RADIUS_M), _SIZE_M / 2)
+    block = Model(
+        mesh, ObjectMaterial(20e3, 0.49), Support(np.zeros(3), up), Tool(_TIP_RADIUS_M), _SIZE_M / 2
+    )
     if name != "fem":  # what a press fitted is all that such a model knows
         fits = {name: np.ones(1) for name in FITS}
         place = _SIZE_M * up[None], up[None]

@@ -16,7 +16,7 @@ from palpate.mechanics.recording.recording import Recording, read_recording
 from palpate.mechanics.recording.segments import TimeSegment
 from palpate.scenes.laboratory.curves import ALONE, Solving
 from palpate.scenes.laboratory.hand import HandOptions, cohort_hand
-from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.presses import Touch
 from palpate.scenes.laboratory.session import SimulateOptions, Staging
 from palpate.scenes.laboratory.simulate import Simulation, simulate

@@ -32,7 +32,7 @@ from palpate.mechanics.compliance.pressed_places import places_at
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.effects.settings import ForwardSettings
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.own_errors import (
     DepthLaw,
@@ -275,7 +275,7 @@ def _model(e: ExplorationEstimate, presses: Presses) -> Model:
     mesh = e.solved.mesh.quadratic()
     return Model(
         mesh=mesh,
-        material=Material(e.fit.modulus_pa, e.sites.poisson_ratio),
+        material=ObjectMaterial(e.fit.modulus_pa, e.sites.poisson_ratio),
         support=Support(e.surface.support_point, e.surface.support_normal),
         tool=Tool(presses.tip_radius_m),
         mesh_size_m=MESH_M,

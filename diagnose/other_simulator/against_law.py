@@ -18,7 +18,7 @@ from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.numerics.base import NumericalEffect, Signal
 from palpate.diagnosis.numerics.registry import numericals
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
-from palpate.diagnosis.other_simulator.stated import StatedForward
+from palpate.diagnosis.other_simulator.declared_parameters import StatedForward
 from palpate.diagnosis.search.attribution import Attribution, attribute
 from palpate.diagnosis.search.descent import Descent
 from palpate.diagnosis.search.evidence import SEEN, Search

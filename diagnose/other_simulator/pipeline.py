@@ -13,9 +13,9 @@ import numpy as np
 from palpate.diagnosis.numerics.registry import NAMES, numerical
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from palpate.diagnosis.other_simulator.against_law import Numerics
-from palpate.diagnosis.other_simulator.beside import Sides, beside, named_numerics
+from palpate.diagnosis.other_simulator.declared_parameters import Stated
 from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions, aligned
-from palpate.diagnosis.other_simulator.parts import (
+from palpate.diagnosis.other_simulator.gap_decomposition import (
     PARAMETER_OF,
     GapSums,
     Reality,
@@ -26,8 +26,8 @@ from palpate.diagnosis.other_simulator.parts import (
     sizes_alone,
     wrong_parameters,
 )
+from palpate.diagnosis.other_simulator.paired_presses import Sides, named_numerics, pair_forces
 from palpate.diagnosis.other_simulator.result import Part, SimulatedGap, Simulator, advice_of
-from palpate.diagnosis.other_simulator.stated import Stated
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.search.gaps import closed_share_ci95
 from palpate.diagnosis.verdict.answer import Answer, Findings
@@ -84,7 +84,7 @@ def diagnose_simulated(
             recording, model, options, part(progress, 0.0, 0.6), nuisance=nuisance, attribution=attribution
         )
     findings: Findings = reality.findings
-    sides = beside(given, findings, asked.stated)
+    sides = pair_forces(given, findings, asked.stated)
     numerics = named_numerics(sides, rules, part(progress, 0.6, 0.95))
     result = _concluded(_weighed(asked, options, rules, reality, sides, numerics))
     progress("done", 1.0)
@@ -120,7 +120,7 @@ def _weighed(
     sides: Sides,
     numerics: Numerics,
 ) -> _Weighed:
-    """The gap, and what is left of it as the parts are taken off (`diagnose.other_simulator.parts`)."""
+    """The gap, and what is left of it as the parts are taken off (`gap_decomposition`)."""
     findings: Findings = reality.findings
     forward, t, rows = sides.forward, sides.forward.touches, sides.rows
     named = {e.name: e.parameters for e in reality.entries if e.name in reality.effects}

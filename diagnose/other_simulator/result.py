@@ -14,8 +14,8 @@ import numpy as np
 
 from palpate.diagnosis.numerics.registry import numerical
 from palpate.diagnosis.other_simulator.against_law import Numerics
-from palpate.diagnosis.other_simulator.parts import StatedParameter
-from palpate.diagnosis.other_simulator.stated import Stated
+from palpate.diagnosis.other_simulator.declared_parameters import Stated
+from palpate.diagnosis.other_simulator.gap_decomposition import StatedParameter
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry, answers_json
 from palpate.diagnosis.verdict.where import Where
 from palpate.mechanics.presses.table import Presses

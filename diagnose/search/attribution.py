@@ -33,7 +33,7 @@ SURE = 2.0
 """Standard errors by which another of as many effects must be better."""
 
 
-def fewer(
+def drop_redundant(
     search: Search, chosen: Sequence[str], current: JudgedSet, alone: dict[str, Score], seen: frozenset[str]
 ) -> tuple[JudgedSet, list[str]]:
     """(the set, its names): what was chosen, or fewer that do as well within one standard error.
@@ -188,7 +188,7 @@ def attribute(
     taken = tuple(name for *_, name in picked)
     current, chosen = _without_idle(search, chosen, current, seen)
     if any(n not in seen for n in chosen):
-        current, chosen = fewer(search, chosen, current, steps[0], seen)
+        current, chosen = drop_redundant(search, chosen, current, steps[0], seen)
         picked += [(steps[0], known_p[0], n) for n in chosen if n not in taken]
     for effect in current.found.effects:
         current = _refined(search, effect, current)

@@ -18,10 +18,10 @@ import numpy as np
 
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import ContactError
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
-from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
+from palpate.mechanics.presses.segmentation import FoundAround, FoundPresses, segment_recording
 from palpate.mechanics.quantities import parse_unit, unit_of_key
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.statistics import spread_about_zero
@@ -160,13 +160,14 @@ def bench_of(
     ]  # the first row in contact
     centre = np.tile([0.0, 0.0, size[2] + HAND_TIP_M], (len(rows), 1))
     lifted = dataclasses.replace(recording, position=recording.position + at_top)
-    presses = cut(
+    presses = segment_recording(
         lifted,
         FoundPresses(lifted.t[first], lifted.t[peak], centre, np.tile(UP, (len(rows), 1)), error),
         FoundAround(others_s=[(lifted.t[a], lifted.t[b - 1]) for a, b in times], noise_n=noise / top),
     )
     model = Model(
-        mesh=mesh.quadratic(), material=Material(middle, poisson_ratio), support=Support(np.zeros(3), UP),
+        mesh=mesh.quadratic(), material=ObjectMaterial(middle, poisson_ratio),
+        support=Support(np.zeros(3), UP),
         tool=Tool(HAND_TIP_M), mesh_size_m=0.01, presses=presses,
     )  # fmt: skip
     similarity = Similarity(length, 1 / top, pace)

@@ -13,8 +13,15 @@ from scipy.stats import t as student
 from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.specimen.approach import APPROACH_LAWS, Approach
 from palpate.diagnosis.specimen.bench import HAND_TIP_M, Bench
+from palpate.diagnosis.specimen.machine_compliance import (
+    Machine,
+    Way,
+    machine_of,
+    own_moduli,
+    rigid_interval,
+    way_of,
+)
 from palpate.diagnosis.specimen.result import MachineTests, Material
-from palpate.diagnosis.specimen.yielding import Machine, Way, machine_of, own_moduli, rigid_interval, way_of
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL

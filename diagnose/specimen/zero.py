@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from palpate.diagnosis.specimen.bench import Bench, MachineCycle
-from palpate.diagnosis.specimen.yielding import Way, left_out_error
+from palpate.diagnosis.specimen.machine_compliance import Way, left_out_error
 from palpate.mechanics.contact.dent import dent_law
 from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 

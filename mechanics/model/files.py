@@ -37,7 +37,7 @@ from palpate.mechanics.model.material import (
     SKIN,
     Ball,
     Gradient,
-    Material,
+    ObjectMaterial,
     Skin,
 )
 from palpate.mechanics.model.model import Model, Support, Tool
@@ -153,7 +153,7 @@ def write_model(path: Path | str, model: Model) -> Path:
     return path
 
 
-def _material_table(material: Material) -> dict[str, Any]:
+def _material_table(material: ObjectMaterial) -> dict[str, Any]:
     """[material] and its tables; parts that are not there are left out."""
     parts = {name: getattr(material, name) for name in ("gradient", "skin")}
     return {
@@ -255,7 +255,7 @@ def _mesh_of(grid: Any) -> TetMesh:
     )
 
 
-def _material_of(keys: Mapping[str, Any], ratios: np.ndarray | None) -> Material:
+def _material_of(keys: Mapping[str, Any], ratios: np.ndarray | None) -> ObjectMaterial:
     """From [material], checked, and the field of mesh.vtu."""
     parts: dict[str, Any] = dict(keys)
     if "gradient" in keys:
@@ -264,7 +264,7 @@ def _material_of(keys: Mapping[str, Any], ratios: np.ndarray | None) -> Material
         parts["skin"] = Skin(**keys["skin"])
     if "inclusions" in keys:
         parts["inclusions"] = {name: Ball(**ball) for name, ball in keys["inclusions"].items()}
-    return Material(**parts, field=ratios)
+    return ObjectMaterial(**parts, field=ratios)
 
 
 def write_csv(path: Path | str, presses: Presses) -> None:

@@ -74,7 +74,7 @@ class Skin:
 
 
 @dataclass(frozen=True, eq=False)
-class Material:
+class ObjectMaterial:
     """SI units. Every ratio is a modulus over the global one; parts that overlap multiply.
 
     young_modulus_pa: the global modulus e of eq. (13), of what is no part of its own; young_modulus_ci95_pa:

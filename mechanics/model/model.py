@@ -14,7 +14,7 @@ import numpy as np
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.material import (
     UNKNOWN,
-    Material,
+    ObjectMaterial,
     finite,
     gradient_ratio,
     height_share,
@@ -79,7 +79,7 @@ class Model(Result):
     """
 
     mesh: TetMesh
-    material: Material
+    material: ObjectMaterial
     support: Support
     tool: Tool
     mesh_size_m: float

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 
 from palpate.scenes.laboratory.curves import PathJob, Solving, curves
-from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT, TouchForce
 from palpate.scenes.laboratory.presses import Touch
 from palpate.scenes.laboratory.specimen import Specimen

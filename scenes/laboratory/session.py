@@ -18,7 +18,7 @@ from palpate.scenes.laboratory.effects.solid import scaled
 from palpate.scenes.laboratory.force import beyond_quasilinear, elastic_force
 from palpate.scenes.laboratory.frame import axes_of, quaternions, random_frame
 from palpate.scenes.laboratory.hand import HandOptions, band_noise
-from palpate.scenes.laboratory.motion import Motion, motion
+from palpate.scenes.laboratory.hand_path import Motion, motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, TouchForce, touch_forces
 from palpate.scenes.laboratory.presses import PROTOCOLS, Touch
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, ball

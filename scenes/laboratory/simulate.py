@@ -15,7 +15,7 @@ from palpate.mechanics.recording.recording import Recording, read_recording, wri
 from palpate.mechanics.result import Result
 from palpate.scenes.laboratory.curves import EVERY_CORE, Solving
 from palpate.scenes.laboratory.effects import REGISTRY, Bench, Readings, effect
-from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.presses import Touch, press_set
 from palpate.scenes.laboratory.session import Session, SimulateOptions, Staging
 from palpate.scenes.laboratory.truth import truth_of

@@ -12,7 +12,7 @@ from palpate.mechanics.presses.gap_bins import gap_by_bin
 from palpate.mechanics.presses.table import HOLDING, LOADING, OUTSIDE, UNLOADING
 from palpate.scenes.laboratory.effects import Readings, effect
 from palpate.scenes.laboratory.force import elastic_force
-from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_OUT
 from palpate.scenes.laboratory.tracing import RATE_HZ
 

@@ -33,7 +33,7 @@ _ENDINGS = (".csv.gz", ".csv", ".toml")
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundRecordings:
     """A recording: its file, and its name, which is that of its folder in the output."""
 
     name: str
@@ -68,7 +68,7 @@ class Choice:
         return dict((self.options or {}).get(step, {}))
 
 
-def find(sources: Iterable[str | Path], leave: Path) -> list[Found]:
+def find(sources: Iterable[str | Path], leave: Path) -> list[FoundRecordings]:
     """Recordings in folders and all below them, by pattern, or by name; in the order of their paths.
 
     leave: the output, which is not looked into. Two of one name get as much of their folders before it as
@@ -84,7 +84,7 @@ def find(sources: Iterable[str | Path], leave: Path) -> list[Found]:
     if not roots:
         raise OptionError("no recordings were named: name folders, patterns or files")
     paths = sorted(roots)
-    return [Found(name, path) for name, path in zip(_names(paths, roots), paths, strict=True)]
+    return [FoundRecordings(name, path) for name, path in zip(_names(paths, roots), paths, strict=True)]
 
 
 def _of_source(source: Path, leave: Path) -> Iterable[tuple[Path, Path]]:
@@ -175,7 +175,7 @@ def content_of(recording: str | Path, shape: str = "") -> dict[str, str]:
         return {name: sha256_of_file(path) for name, path in files.items() if path.is_file()}
 
 
-def tasks_of(found: Found, choice: Choice, out: Path) -> list[Task]:
+def tasks_of(found: FoundRecordings, choice: Choice, out: Path) -> list[Task]:
     """The recording's tasks, in order; raises RecordingError where its files cannot be read."""
     options = {step: choice.of(step) for step in choice.steps}
     shape = options["reconstruct"].pop("shape", "")  # a place: what counts is what the file holds

@@ -29,7 +29,7 @@ def _page(path: Path, subject: Subject, **more: Any) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Format:
+class ExportFormat:
     """A program's file: its suffix, its writer, which returns what the format cannot say, how such a file
     begins, and what to do with it ({path}: the file; commands between backticks)."""
 
@@ -41,45 +41,45 @@ class Format:
 
 _SCRIPT = Kind("a script of palpate export", (b"# Palpate model",))
 FORMATS = {
-    "mujoco": Format(
+    "mujoco": ExportFormat(
         ".xml",
         mujoco.write,
         Kind("a scene of palpate export", (b"<!-- Palpate model",)),
         "look at it: `python -m mujoco.viewer --mjcf={path}`",
     ),
-    "sofa": Format(
+    "sofa": ExportFormat(
         ".scn",
         sofa.write,
         Kind("a scene of palpate export", (b"<?xml",), holds=b"<!-- Palpate model"),
         "run it: `runSofa {path}`",
     ),
-    "abaqus": Format(
+    "abaqus": ExportFormat(
         ".inp",
         abaqus.write,
         Kind("a deck of palpate export", (b"*Heading\n Palpate model",)),
         "solve it with Abaqus or CalculiX: the reference point's force is the press",
     ),
-    "gmsh": Format(
+    "gmsh": ExportFormat(
         ".msh",
         gmsh.write,
         Kind("a mesh of palpate export", (b"$MeshFormat",), holds=b"young_modulus_pa"),
         "look at it: `gmsh {path}`",
     ),
-    "page": Format(
+    "page": ExportFormat(
         ".html",
         _page,
         Kind("a page of palpate export", (b"<!doctype html>",), holds=b"Made by palpate"),
         "open {path} in any browser, and press",
     ),
-    "usd": Format(
+    "usd": ExportFormat(
         ".usda",
         usd.write,
         Kind("a stage of palpate export", (b"#usda 1.0",), holds=b"Palpate model"),
         "look at it: `usdview {path}`",
     ),
-    "newton": Format(".py", scripts.write_newton, _SCRIPT, "press it: `python {path}`"),
-    "drake": Format(".py", scripts.write_drake, _SCRIPT, "press it: `python {path}`"),
-    "stl": Format(
+    "newton": ExportFormat(".py", scripts.write_newton, _SCRIPT, "press it: `python {path}`"),
+    "drake": ExportFormat(".py", scripts.write_drake, _SCRIPT, "press it: `python {path}`"),
+    "stl": ExportFormat(
         ".stl",
         stl.write,
         Kind("an STL of palpate export", (stl.HEADER,)),

@@ -18,7 +18,7 @@ LEAST_MEASURE_S = 1.0
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundDevice:
     """Devices, each with its rate where that was measured."""
 
     devices: Sequence[tuple[Availability, Rate | None]]
@@ -53,7 +53,7 @@ def devices(
         option("open the hardware that is there, force off, and measure its rate for this long", unit="s"),
     ] = None,
     options: Annotated[Mapping[str, Any], EachOf({name: options_of(name) for name in HARDWARE})],
-) -> Found:
+) -> FoundDevice:
     """Every device that was asked for, with its rate, Hz, where that was measured."""
     if measure is not None and not measure >= LEAST_MEASURE_S:
         raise OptionError(f"--measure is {measure}; it must be at least {LEAST_MEASURE_S:g} s")
@@ -62,7 +62,7 @@ def devices(
     if measure is not None:
         chosen = dict.fromkeys(d.spec.name for d in found if d.present and d.spec.name in HARDWARE)
         rates = {name: _measured(name, options[name], measure) for name in chosen}
-    return Found([(d, rates.get(d.spec.name) if d.present else None) for d in found])
+    return FoundDevice([(d, rates.get(d.spec.name) if d.present else None) for d in found])
 
 
 def _measured(name: str, options: Any, seconds: float) -> Rate:

@@ -177,9 +177,9 @@ def diagnose(
         if renderer is None and forces is None:
             result = diagnosed(measured, made, options, rest, **rules)
         else:
+            from palpate.diagnosis.other_simulator.declared_parameters import stated_of
             from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
             from palpate.diagnosis.other_simulator.result import Mended
-            from palpate.diagnosis.other_simulator.stated import stated_of
 
             if forces is not None:
                 simulation = Asked(forces, stated_of(stated, made), of_forces)
@@ -255,9 +255,9 @@ def _simulations(
     """What each gave along the recorded path, over the same presses; and what it says of itself."""
     import numpy as np
 
+    from palpate.diagnosis.other_simulator.declared_parameters import stated_of, stated_values
     from palpate.diagnosis.other_simulator.forces import Forces
     from palpate.diagnosis.other_simulator.pipeline import Asked
-    from palpate.diagnosis.other_simulator.stated import stated_of, stated_values
 
     most = presses or fewest(made)
     share = 1 / len(made)
@@ -305,7 +305,7 @@ def _check(
         words = "name its forces by --simulated, or the simulator by --renderer"
         raise OptionError(f"--stated says what a simulator was given: {words}")
     if stated:
-        from palpate.diagnosis.other_simulator.stated import stated_values
+        from palpate.diagnosis.other_simulator.declared_parameters import stated_values
 
         stated_values(stated)
 

@@ -10,9 +10,9 @@ import pytest
 
 from palpate.mechanics.compliance.sites import touch_sites
 from palpate.mechanics.contact.touch import touch_force
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.presses.cutting import FoundPresses, cut
+from palpate.mechanics.presses.segmentation import FoundPresses, segment_recording
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.shape.tetmesh import TetMesh
@@ -112,7 +112,7 @@ class Bench:
         )
         self.known = np.array(onsets), np.array(peaks), np.array([i for i, _ in presses])
         model = Model(
-            mesh=self.mesh, material=Material(MODULUS, NU),
+            mesh=self.mesh, material=ObjectMaterial(MODULUS, NU),
             support=Support(np.zeros(3), np.array([0, 0, 1.0])), tool=Tool(RADIUS), mesh_size_m=0.02,
             presses=self.table(recording), path=self.folder,
         )  # fmt: skip
@@ -124,7 +124,7 @@ class Bench:
         onset, peak, place = self.known
         normal = self.normals[place]
         centre = self.points[place] + RADIUS * normal
-        return cut(recording, FoundPresses(onset, peak, centre, normal))
+        return segment_recording(recording, FoundPresses(onset, peak, centre, normal))
 
 
 @pytest.fixture(scope="session")

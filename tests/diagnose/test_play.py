@@ -10,7 +10,7 @@ from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.instrument.instrument_effects import seen_play
 from palpate.diagnosis.instrument.support_readings import Rigid
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
-from palpate.diagnosis.search.attribution import Attribution, attribute, fewer
+from palpate.diagnosis.search.attribution import Attribution, attribute, drop_redundant
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.whiten import Whitener
@@ -78,7 +78,7 @@ def put_back(bench, alter, *chosen: str) -> list[str]:
         candidate = search.judge([*base.found.effects, effect(name)], like=base)
         alone[name] = search.score([effect(name)], candidate, base)
     whole = search.judge([*base.found.effects, *(effect(n) for n in chosen)], like=base)
-    return fewer(search, chosen, whole, alone, frozenset())[1]
+    return drop_redundant(search, chosen, whole, alone, frozenset())[1]
 
 
 @pytest.mark.slow

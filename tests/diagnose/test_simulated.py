@@ -14,6 +14,7 @@ from palpate.diagnosis.numerics.lost_contact import lost
 from palpate.diagnosis.numerics.registry import NAMES, numericals
 from palpate.diagnosis.options import DiagnoseOptions
 from palpate.diagnosis.other_simulator.against_law import seen_in_samples
+from palpate.diagnosis.other_simulator.declared_parameters import StatedForward, stated_of
 from palpate.diagnosis.other_simulator.forces import (
     Forces,
     ForcesOptions,
@@ -22,17 +23,16 @@ from palpate.diagnosis.other_simulator.forces import (
     sorted_forces,
     spread_out,
 )
-from palpate.diagnosis.other_simulator.parts import PARAMETER_OF, StatedParameter
+from palpate.diagnosis.other_simulator.gap_decomposition import PARAMETER_OF, StatedParameter
 from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
-from palpate.diagnosis.other_simulator.stated import StatedForward, stated_of
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import EffectEntry
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.effects.registry import NAMES as PHYSICAL
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.errors import OptionError, RecordingError
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import LEAD_S
 from palpate.mechanics.progress import silent
@@ -292,7 +292,7 @@ def test_mujoco_as_documented_lets_a_deep_press_through(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # it leaves its warnings in a file where it runs
     radius, up = 0.005, np.array([0.0, 0.0, 1.0])
     mesh = box_mesh((5, 5, 3), (0.05, 0.05, 0.03))
-    block = Model(mesh, Material(30e3, 0.45), Support(np.zeros(3), up), Tool(radius), 0.01)
+    block = Model(mesh, ObjectMaterial(30e3, 0.45), Support(np.zeros(3), up), Tool(radius), 0.01)
     deep = np.interp(np.arange(0, 1.3, 0.005), [0.0, 0.5, 0.8, 1.3], [-1e-3, 8e-3, 8e-3, -1e-3])
     centre = up * (0.03 + radius - deep)[:, None]
     force = replay(create("mujoco", block), np.arange(len(deep)) * 0.005, centre, progress=silent)

@@ -11,7 +11,7 @@ from palpate.mechanics.model.material import (
     MODULUS_LIMITS,
     Ball,
     Gradient,
-    Material,
+    ObjectMaterial,
     Skin,
     inclusion_ratio,
     skin_ratio,
@@ -30,7 +30,7 @@ def cube() -> TetMesh:
 
 def model(order: int) -> Model:
     mesh = cube() if order == 1 else cube().quadratic()
-    material = Material(
+    material = ObjectMaterial(
         16e3, 0.49, (15e3, 17e3), "neo-hookean", {"a ball": Ball((0.5, 0.5, 0.6), 0.3, 6.0)},
         Gradient(1.5, 0.7), Skin(0.1, 3.0), np.linspace(1, 2, len(mesh.tetrahedra)),
     )  # fmt: skip
@@ -125,7 +125,7 @@ def test_an_inverted_tetrahedron_is_refused():
 
 
 def test_a_plain_object_has_one_modulus():
-    plain = model(1).replaced(material=Material(16e3, 0.49))
+    plain = model(1).replaced(material=ObjectMaterial(16e3, 0.49))
     assert (plain.element_ratio == 1).all()
     assert plain.material.dent_law == "linear" and np.isnan(plain.material.young_modulus_ci95_pa).all()
 
@@ -135,7 +135,7 @@ def test_moduli_of_elements_are_the_product_of_the_parts(box):
     ball, skin = Ball((0.01, 0.0, 0.03), 0.02, 6.0), Skin(0.008, 3.0)
     gradient, field = Gradient(1.5, 0.7), np.linspace(0.8, 1.2, len(mesh.tetrahedra))
     support = Support(np.array([0.0, 0.0, 0.01]), np.array([0.0, 0.0, 2.0]))
-    material = Material(16e3, 0.49, inclusions={"a": ball}, gradient=gradient, skin=skin, field=field)
+    material = ObjectMaterial(16e3, 0.49, inclusions={"a": ball}, gradient=gradient, skin=skin, field=field)
     made = Model(mesh, material, support, Tool(0.005), 0.02)
     # linear in height from the support, 1 cm up, to the highest node, 6 cm up
     height = (mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)[:, 2] - 0.01) / 0.05

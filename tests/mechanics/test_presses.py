@@ -7,9 +7,9 @@ import pytest
 
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.files import read_presses, write_csv, write_presses
-from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut, free_segments
 from palpate.mechanics.presses.making import of_places
 from palpate.mechanics.presses.repeats import sites_of
+from palpate.mechanics.presses.segmentation import FoundAround, FoundPresses, free_segments, segment_recording
 from palpate.mechanics.presses.table import FITS
 from palpate.mechanics.recording.recording import Recording
 
@@ -40,7 +40,7 @@ def table(made: Recording, places=3, repeats=2, until_s=None, **around):
     begin = 2.0 * np.arange(count)
     x = np.tile(np.arange(places) * 0.02, repeats)
     centre = np.column_stack([x, np.zeros(count), np.full(count, TIP)])
-    return cut(
+    return segment_recording(
         made,
         FoundPresses(begin + 1.0 + 1 / 6, begin + 1.5, centre, np.tile(UP, (count, 1)), until_s=until_s),
         FoundAround(**around),

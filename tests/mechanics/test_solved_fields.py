@@ -11,7 +11,7 @@ from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.pressed_places import Places
 from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
 from palpate.mechanics.frames import local_frames
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import box_mesh
 
@@ -22,7 +22,7 @@ AT_M = (0.018, 0.024, 0.033, 0.042)
 def _places(edge_cells: int) -> Places:
     """Sixteen places on a slab of 60 mm and 20 mm thick."""
     mesh = box_mesh((edge_cells, edge_cells, 3), (0.06, 0.06, 0.02))
-    model = Model(mesh.quadratic(), Material(1e4, NU), Support(np.zeros(3), UP), Tool(0.005), 0.01)
+    model = Model(mesh.quadratic(), ObjectMaterial(1e4, NU), Support(np.zeros(3), UP), Tool(0.005), 0.01)
     centre = mesh.points[:, :2].mean(axis=0) - 0.03
     point = np.array([[x + centre[0], y + centre[1], 0.02] for x in AT_M for y in AT_M])
     normal = np.tile(UP, (len(point), 1))

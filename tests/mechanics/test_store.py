@@ -12,7 +12,7 @@ from palpate.mechanics.compliance.stored_compliance import load_or_condense
 from palpate.mechanics.disk.store import content_key, load_or_build, read_arrays, write_arrays
 from palpate.mechanics.errors import CacheError
 from palpate.mechanics.model.files import read_model, write_model
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 
 from ..support.waiting import PATIENCE_S
@@ -128,7 +128,7 @@ def test_a_models_compliance_is_kept_and_follows_its_content(tmp_path, box):
     mesh = box((4, 4, 2), (0.03, 0.03, 0.02))
     model = Model(
         mesh=mesh,
-        material=Material(20e3, 0.45),
+        material=ObjectMaterial(20e3, 0.45),
         support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
         tool=Tool(0.005),
         mesh_size_m=0.01,

@@ -11,7 +11,7 @@ import palpate as pp
 from palpate.diagnosis.forward.touches import unobservable_effects
 from palpate.diagnosis.pipeline import with_tip_of
 from palpate.mechanics.errors import ContactError, OptionError
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.reconstruction.geometry.stated import nowhere
@@ -111,7 +111,7 @@ def slab():
     points = mesh.points + [-0.036, -0.036, -0.03]
     mesh = TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable)
     support = Support(np.array([0.0, 0.0, -0.03]), np.array([0.0, 0.0, 1.0]))
-    return Model(mesh, Material(MODULUS_PA, 0.49), support, Tool(0.006), 0.01)
+    return Model(mesh, ObjectMaterial(MODULUS_PA, 0.49), support, Tool(0.006), 0.01)
 
 
 @pytest.mark.parametrize("made", [cyclic, points])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.compliance.sites import TouchSites
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
@@ -17,7 +17,7 @@ from palpate.reconstruction.geometry.stated import GeometryOptions, nowhere
 from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
-from palpate.reconstruction.steps.s3_contacts.straightened import slid_in, straightened
+from palpate.reconstruction.steps.s3_contacts.sliding_presses import slid_in, straightened
 from palpate.reconstruction.steps.s7_modulus.modulus import fit_modulus
 
 from .flat_contact import pushed, recorded
@@ -103,7 +103,7 @@ def test_slides_over_another_recordings_slab_are_straightened_too(kind):
     box = box_mesh((16, 30, 3), (0.16, 0.30, 0.03))
     mesh = TetMesh(box.points - [0.0, 0.0, 0.03], box.tetrahedra, box.fixed, box.touchable).quadratic()
     below = Support(np.array([0.0, 0.0, -0.03]), np.array([0.0, 0.0, 1.0]))
-    model = Model(mesh, Material(MODULUS_PA, 0.49), below, Tool(TIP_M), 0.01)
+    model = Model(mesh, ObjectMaterial(MODULUS_PA, 0.49), below, Tool(TIP_M), 0.01)
     model = model.replaced(about={"geometry": {"kind": kind}})
     recording = dataclasses.replace(sliding(0.3, leaves=True), description={"object": {"half_space": True}})
     assert slid_in(presses_on(recording, model)).any() == (kind == "shape")

@@ -7,7 +7,7 @@ import numpy as np
 from palpate.mechanics.compliance.sites import patch_width
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance, patch_blocks
 from palpate.mechanics.elastic.solver import Solver
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 from palpate.render.fem.renderer import FemRenderer
@@ -63,7 +63,7 @@ def model(mesh: TetMesh, modulus: float = 30e3, poisson: float = 0.49, tip: floa
     """A homogeneous model of a mesh on the plane z = 0."""
     return Model(
         mesh=mesh,
-        material=Material(modulus, poisson),
+        material=ObjectMaterial(modulus, poisson),
         support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
         tool=Tool(tip),
         mesh_size_m=0.01,

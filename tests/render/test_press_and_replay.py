@@ -10,7 +10,7 @@ import pytest
 
 from palpate.cli import main
 from palpate.mechanics.errors import OptionError, RecordingError
-from palpate.mechanics.presses.cutting import FoundPresses, cut
+from palpate.mechanics.presses.segmentation import FoundPresses, segment_recording
 from palpate.mechanics.recording.recording import Recording
 from palpate.render.press import Stroke, greatest_difference, press, read_curve, write_curve
 from palpate.render.replay import replay, replay_error, replay_touches
@@ -74,7 +74,7 @@ def test_replay_error_counts_contact_samples_of_phase_two_only(cylinder_renderer
     recording = Recording(t, position, force, 1000.0, TIP, boundary_phase=(0.1, 0.8))
     forces = replay(cylinder_renderer, t, position)
     touched = np.flatnonzero(curve.depth > 0)[0]
-    presses = cut(
+    presses = segment_recording(
         recording,
         FoundPresses(
             onset_s=t[[lead + touched]],

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.progress import silent
 from palpate.mechanics.shape.tetmesh import box_mesh
@@ -26,7 +26,9 @@ E, NU, RADIUS = 30e3, 0.4, 0.006
 @pytest.fixture(scope="module")
 def model():
     mesh = box_mesh((8, 8, 4), (0.048, 0.048, 0.024)).quadratic()
-    return Model(mesh, Material(E, NU), Support(np.zeros(3), np.array([0, 0, 1.0])), Tool(RADIUS), 0.006)
+    return Model(
+        mesh, ObjectMaterial(E, NU), Support(np.zeros(3), np.array([0, 0, 1.0])), Tool(RADIUS), 0.006
+    )
 
 
 def pressed(model, name, **options):

@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate import cli
 from palpate.mechanics.model.files import read_model, write_model
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.recording.recording import read_recording, write_recording
 from palpate.mechanics.shape.tetmesh import box_mesh
@@ -92,7 +92,7 @@ def cube() -> Model:
     """Of 40 mm: what is damaged is computed anew, and that costs seconds where the object is small."""
     mesh = box_mesh((3, 3, 3), (0.04, 0.04, 0.04)).quadratic()
     return Model(
-        mesh, Material(20e3, 0.49), Support(np.zeros(3), np.array([0.0, 0.0, 1.0])), Tool(0.005), 0.0133
+        mesh, ObjectMaterial(20e3, 0.49), Support(np.zeros(3), np.array([0.0, 0.0, 1.0])), Tool(0.005), 0.0133
     )
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import option
-from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
 from palpate.mechanics.presses.repeats import SITE_M
+from palpate.mechanics.presses.segmentation import FoundAround, FoundPresses, segment_recording
 from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.shapes.fit import LEAST_TOUCHES
@@ -189,7 +189,7 @@ def _tabled(
     """
     signals, contacts, (delay_s, delay_error_s) = found.spans.filtered.signals, found.touches, delay
     t, first_last = recording.t, found.boundary.interval
-    presses = cut(
+    presses = segment_recording(
         recording,
         FoundPresses(
             onset_s=t[[c.start for c in contacts]],

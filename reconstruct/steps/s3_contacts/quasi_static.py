@@ -16,8 +16,8 @@ from scipy.spatial import cKDTree
 from scipy.stats import theilslopes
 
 from palpate.mechanics.errors import ContactError
-from palpate.mechanics.presses.cutting import FoundAround, FoundPresses, cut
 from palpate.mechanics.presses.repeats import sites_of
+from palpate.mechanics.presses.segmentation import FoundAround, FoundPresses, segment_recording
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.statistics import spread_about_zero
@@ -214,7 +214,7 @@ def _tabled(
         description=recording.description,
     )
     peak = np.array([t[c + int(g.loading.push.argmax())] for c, g in zip(counts[:-1], groups, strict=True)])
-    table = cut(
+    table = segment_recording(
         gathered,
         FoundPresses(
             onset_s=begin,

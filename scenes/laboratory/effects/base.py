@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.presses import Touch
 from palpate.scenes.laboratory.specimen import Specimen
 from palpate.scenes.phantoms import Phantom

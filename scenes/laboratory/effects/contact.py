@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import fftconvolve
 
 from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters
-from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_OUT
 from palpate.scenes.laboratory.tracing import RATE_HZ
 

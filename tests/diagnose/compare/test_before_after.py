@@ -10,7 +10,7 @@ import pytest
 import palpate.show  # noqa: F401  who says and draws results
 from palpate import cli
 from palpate.diagnosis.compare.before_after import Side, changes
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.making import of_places
 from palpate.mechanics.shape.tetmesh import box_mesh
@@ -26,7 +26,8 @@ def side(modulus, *, share=0.03, effects=(), intervals=None, beside=None, seed=0
     presses = of_places(np.repeat(at, 2, axis=0), np.tile(UP, (18, 1)), 0.004, fits={"e_pa": own})
     interval = (modulus * np.exp(-1.96 * share), modulus * np.exp(1.96 * share))
     model = Model(
-        box_mesh((6, 6, 2), (0.06, 0.06, 0.02)), Material(modulus, 0.49, interval), Support(np.zeros(3), UP),
+        box_mesh((6, 6, 2), (0.06, 0.06, 0.02)), ObjectMaterial(modulus, 0.49, interval),
+        Support(np.zeros(3), UP),
         Tool(0.004), 0.01, presses=presses,
     )  # fmt: skip
     entries = [

@@ -228,7 +228,7 @@ def test_touches_that_were_off_widen_what_a_surface_says_of_itself():
 
 def test_a_robot_in_the_laboratory_presses_as_fast_and_as_long_as_it_is_told():
     from palpate.scenes.laboratory.hand import HandOptions
-    from palpate.scenes.laboratory.motion import _one_touch
+    from palpate.scenes.laboratory.hand_path import _one_touch
     from palpate.scenes.laboratory.paths import WAY_IN
     from palpate.scenes.laboratory.presses import Touch
     from palpate.scenes.laboratory.surface import Surface

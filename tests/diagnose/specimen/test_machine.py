@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from palpate.diagnosis.specimen.bench import MachineCycle
+from palpate.diagnosis.specimen.machine_compliance import machine_of, way_of
 from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
-from palpate.diagnosis.specimen.yielding import machine_of, way_of
 from palpate.mechanics.contact.dent import dent_law
 from palpate.show.material import in_words
 

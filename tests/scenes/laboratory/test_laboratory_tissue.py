@@ -13,7 +13,7 @@ from palpate.mechanics.effects.power_law_relaxation import prony_terms
 from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.effects.viscoelasticity import LAW as PRONY
 from palpate.scenes.laboratory.effects import effect
-from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
 from palpate.scenes.laboratory.tracing import RATE_HZ
 

@@ -20,7 +20,7 @@ from palpate import cli
 from palpate.exporting.mujoco import FILE_SETTINGS
 from palpate.mechanics.disk.surface_files import read_surface
 from palpate.mechanics.model.files import write_model
-from palpate.mechanics.model.material import Ball, Material
+from palpate.mechanics.model.material import Ball, ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.progress import silent
 from palpate.mechanics.shape.tetmesh import box_mesh
@@ -41,7 +41,7 @@ def block(nu: float = 0.49, order: int = 2, ball: bool = True, cells=(8, 7, 5)) 
     inside = {"lump": Ball((0.0, 0.0, 0.015), 0.008, 5.0)} if ball else {}
     return Model(
         mesh=mesh if order == 1 else mesh.quadratic(),
-        material=Material(15e3, nu, inclusions=inside),
+        material=ObjectMaterial(15e3, nu, inclusions=inside),
         support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
         tool=Tool(0.005),
         mesh_size_m=0.0075,

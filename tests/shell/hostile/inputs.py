@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate import cli
-from palpate.mechanics.model.material import Ball, Material, Skin
+from palpate.mechanics.model.material import Ball, ObjectMaterial, Skin
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import box_mesh
 
@@ -61,7 +61,7 @@ def block():
     mesh = box_mesh((2, 2, 1), (0.06, 0.06, 0.03))
     return Model(
         mesh,
-        Material(
+        ObjectMaterial(
             20e3,
             0.45,
             (19e3, 21e3),

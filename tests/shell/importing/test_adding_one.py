@@ -12,7 +12,7 @@ import pytest
 
 import palpate as pp
 from palpate import cli
-from palpate.importing.formats.registry import FORMATS, Format
+from palpate.importing.formats.registry import FORMATS, TableFormat
 from palpate.importing.tables import Table
 from palpate.mechanics.errors import RecordingError
 
@@ -42,6 +42,6 @@ def test_a_table_format_is_added_in_one_file_and_one_line(tmp_path, monkeypatch:
     with pytest.raises(RecordingError, match="of no kind that can be read: allowed are csv, "):
         pp.read_table(log, tip_radius_m=TIP)
     monkeypatch.setitem(sys.modules, "palpate.importing.formats.lists", _module())
-    monkeypatch.setitem(FORMATS, "lists", Format("palpate.importing.formats.lists", (".lists",)))
+    monkeypatch.setitem(FORMATS, "lists", TableFormat("palpate.importing.formats.lists", (".lists",)))
     assert cli.main(words) == 0
     check(pp.read_recording(tmp_path / "rec.csv"), world)

@@ -19,7 +19,7 @@ from palpate.mechanics.effects.strain_stiffening import stiffening
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.options import RenderOptions
 from palpate.scenes.laboratory.effects import effect
-from palpate.scenes.laboratory.motion import Motion
+from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.paths import WAY_IN, WAY_OUT
 
 from ...render import shapes

@@ -251,7 +251,7 @@ def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
     import sys
     from types import ModuleType
 
-    from palpate.mechanics.model.material import Material
+    from palpate.mechanics.model.material import ObjectMaterial
     from palpate.mechanics.model.model import Model, Support, Tool
     from palpate.mechanics.shape.tetmesh import box_mesh
 
@@ -267,6 +267,6 @@ def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "IPython.display", kernel.display)
     mesh = box_mesh((4, 4, 2), (0.06, 0.06, 0.03)).quadratic()
     support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    model = Model(mesh, Material(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015)
+    model = Model(mesh, ObjectMaterial(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015)
     assert model.show() is None
     assert len(shown) == 1 and shown[0].startswith("<div><iframe srcdoc=") and "view3d" in shown[0]

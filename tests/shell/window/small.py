@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.mechanics.model.files import read_model, write_model
-from palpate.mechanics.model.material import Material
+from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.scenes.virtual_presses import palpate_model
@@ -43,7 +43,7 @@ def block_model(folder: Path, young_modulus_pa: float = 20e3, cells: tuple[int, 
     """A MODEL folder of the block, with presses for the 1D renderers."""
     model = Model(
         mesh=block_mesh(cells).quadratic(),
-        material=Material(young_modulus_pa, 0.49, dent_law="neo-hookean"),
+        material=ObjectMaterial(young_modulus_pa, 0.49, dent_law="neo-hookean"),
         support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
         tool=Tool(0.005),
         mesh_size_m=float(SIZE[0]) / cells[0],

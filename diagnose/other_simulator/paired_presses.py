@@ -10,9 +10,9 @@ from palpate.diagnosis.forward.touches import LEAST_PRESSES, LEAST_ROWS, touches
 from palpate.diagnosis.numerics.base import signal_of
 from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.other_simulator.against_law import LEAST_SHARE, Numerics, numerics_of, seen_in_samples
+from palpate.diagnosis.other_simulator.declared_parameters import Stated, StatedForward
 from palpate.diagnosis.other_simulator.forces import Aligned
-from palpate.diagnosis.other_simulator.parts import law_at
-from palpate.diagnosis.other_simulator.stated import Stated, StatedForward
+from palpate.diagnosis.other_simulator.gap_decomposition import law_at
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.mechanics.presses.table import MARGIN_S, Presses
 from palpate.mechanics.progress import Progress
@@ -32,7 +32,7 @@ class Sides:
     notes: tuple[str, ...]
 
 
-def beside(given: Aligned, findings: Findings, stated: Stated) -> Sides:
+def pair_forces(given: Aligned, findings: Findings, stated: Stated) -> Sides:
     """The forces as touches, row by row beside the real ones."""
     presses, met = findings.readings.presses, findings.readings.met
     run = np.flatnonzero(given.usable)

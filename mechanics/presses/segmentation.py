@@ -148,7 +148,7 @@ class FoundAround:
     delay_error_s: float = 0.0
 
 
-def cut(
+def segment_recording(
     recording: Recording,
     found: FoundPresses,
     around: FoundAround = FoundAround(),

@@ -28,7 +28,7 @@ import numpy as np
 from palpate.diagnosis.numerics.registry import numerical
 from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.other_simulator.against_law import COMMON_ERROR, Numerics
-from palpate.diagnosis.other_simulator.stated import Stated, StatedForward
+from palpate.diagnosis.other_simulator.declared_parameters import Stated, StatedForward
 from palpate.diagnosis.search.descent import Descent
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit, settings_of
