@@ -32,6 +32,7 @@ class Unit(NamedTuple):
 _BASE = {
     "1": Unit(1.0, 0, 0, 0),
     "bytes": Unit(1.0, 0, 0, 0),
+    "GB": Unit(1e9, 0, 0, 0),
     "rad": Unit(1.0, 0, 0, 0),
     "deg": Unit(math.pi / 180, 0, 0, 0),
     "m": Unit(1.0, 1, 0, 0),

@@ -70,7 +70,7 @@ def test_every_unit_that_the_program_states_can_be_parsed():
         for package in PACKAGES
         for path in (ROOT / package).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("option", "Key")
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("option", "FileKey")
         for keyword in node.keywords
         if keyword.arg == "unit" and isinstance(keyword.value, ast.Constant)
     }
