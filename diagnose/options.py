@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from scipy.special import logit
 
 from palpate.mechanics.effects.registry import known
+from palpate.mechanics.law_errors import DepthLaw, Direction, FirstTouch, Repeats, Slip, Stiffness, Unnamed
 from palpate.mechanics.options import EXACT, option
-from palpate.mechanics.own_errors import DepthLaw, Direction, FirstTouch, Repeats, Slip, Stiffness, Unnamed
 
 
 @dataclass(frozen=True)

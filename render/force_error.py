@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.contact.edges import nearness
-from palpate.mechanics.own_errors import Bound
+from palpate.mechanics.law_errors import Bound
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.render.base import Renderer
 from palpate.render.fem.renderer import FemRenderer

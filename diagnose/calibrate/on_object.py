@@ -30,8 +30,8 @@ from palpate.mechanics.effects.time_delay import EFFECT as DELAY
 from palpate.mechanics.effects.tool_compliance import EFFECT as SPRING
 from palpate.mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.law_errors import Level
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.own_errors import Level
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.mechanics.recording.recording import Recording

@@ -21,11 +21,11 @@ from palpate.mechanics.compliance.pressed_places import UNIFORM, Places, places_
 from palpate.mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
 from palpate.mechanics.compliance.smooth_field import SmoothField
 from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.law_errors import DepthLaw
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.model.one_d_laws import LAWS as ONE_D_LAWS
 from palpate.mechanics.model.one_d_laws import RIVALS as RIVALS
 from palpate.mechanics.model.one_d_laws import OneDLaws, forces_of, spread_law
-from palpate.mechanics.own_errors import DepthLaw
 from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.presses.table import MARGIN_S, Presses

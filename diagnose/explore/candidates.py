@@ -28,8 +28,8 @@ from palpate.diagnosis.forward.planned import Plan, pressed
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL_COMPLIANCE
+from palpate.mechanics.law_errors import FirstTouch, Stiffness
 from palpate.mechanics.options import option
-from palpate.mechanics.own_errors import FirstTouch, Stiffness
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.statistics import squared_exponential
 from palpate.reconstruction.shapes.outline import farthest_points

@@ -27,7 +27,7 @@ from palpate.diagnosis.explore.weighing import Act, Weighing, weigh
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import AttributionOptions
 from palpate.mechanics.effects.registry import effect
-from palpate.mechanics.own_errors import Smallest
+from palpate.mechanics.law_errors import Smallest
 
 NONE = "none"
 FALSE_ALARMS = 0.02

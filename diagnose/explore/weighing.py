@@ -32,9 +32,7 @@ from palpate.mechanics.compliance.pressed_places import places_at
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.effects.settings import ForwardSettings
-from palpate.mechanics.model.material import ObjectMaterial
-from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.own_errors import (
+from palpate.mechanics.law_errors import (
     DepthLaw,
     Direction,
     FiniteStrain,
@@ -44,6 +42,8 @@ from palpate.mechanics.own_errors import (
     Stiffness,
     Unnamed,
 )
+from palpate.mechanics.model.material import ObjectMaterial
+from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.statistics import squared_exponential
 from palpate.reconstruction.steps.s5_mesh.meshing import uncertainty_at

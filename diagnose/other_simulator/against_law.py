@@ -26,7 +26,7 @@ from palpate.diagnosis.search.fit import Fit, parameter_intervals, settings_of
 from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours, never_worse
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
-from palpate.mechanics.own_errors import DepthLaw, FirstTouch, Level, Repeats, Smallest, Stiffness, Unnamed
+from palpate.mechanics.law_errors import DepthLaw, FirstTouch, Level, Repeats, Smallest, Stiffness, Unnamed
 from palpate.mechanics.presses.table import Noise
 from palpate.mechanics.progress import Progress, silent
 

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import NuisanceOptions
 from palpate.diagnosis.search.fit import Fit
-from palpate.mechanics.own_errors import Repeats, Stiffness
+from palpate.mechanics.law_errors import Repeats, Stiffness
 from palpate.mechanics.presses.table import Presses
 
 

@@ -22,7 +22,7 @@ from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.diagnosis.specimen.bench import PEAK_N, Bench
 from palpate.diagnosis.verdict.result import Diagnosis
-from palpate.mechanics.own_errors import DepthLaw, FirstTouch, Repeats, Unnamed
+from palpate.mechanics.law_errors import DepthLaw, FirstTouch, Repeats, Unnamed
 from palpate.mechanics.presses.table import HOLDING, Presses
 from palpate.mechanics.progress import Progress, silent
 

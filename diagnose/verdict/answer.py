@@ -16,7 +16,7 @@ from palpate.diagnosis.search.gaps import modulus_share
 from palpate.diagnosis.search.site_stiffness import heterogeneity, site_factors
 from palpate.mechanics.effects.base import Role
 from palpate.mechanics.effects.registry import effect, effects
-from palpate.mechanics.own_errors import FiniteStrain
+from palpate.mechanics.law_errors import FiniteStrain
 
 
 @dataclass(frozen=True)

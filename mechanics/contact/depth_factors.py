@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.mechanics.own_errors import Stiffness
+from palpate.mechanics.law_errors import Stiffness
 
 _DEGREE = 3
 

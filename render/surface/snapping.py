@@ -15,8 +15,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import cKDTree
 
+from palpate.mechanics.law_errors import FirstTouch
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.own_errors import FirstTouch
 from palpate.render.options import RenderOptions
 from palpate.render.surface.bvh import STACK, closest_triangle
 from palpate.render.surface.contact import outside

@@ -12,7 +12,7 @@ from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
 from palpate.diagnosis.search.whiten import nuisance_columns
 from palpate.mechanics.effects.finite_strain import EFFECT as STRAIN
-from palpate.mechanics.own_errors import Stiffness
+from palpate.mechanics.law_errors import Stiffness
 from palpate.mechanics.press_solver import solved_places
 from palpate.mechanics.press_solver.press import LAWS
 

@@ -8,7 +8,7 @@ import pytest
 from palpate.mechanics.contact.depth_factors import DepthFactors
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.own_errors import Stiffness
+from palpate.mechanics.law_errors import Stiffness
 from palpate.mechanics.press_solver import solved_places
 from palpate.mechanics.press_solver.solved_places import (
     PlacesToSolve,

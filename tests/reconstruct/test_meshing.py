@@ -21,8 +21,8 @@ from palpate.reconstruction.steps.s5_mesh.meshing import (
     radius_edge_ratio,
     relaxed,
 )
-from palpate.reconstruction.steps.s5_mesh.of_voxels import labels, voxel_surface
 from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
+from palpate.reconstruction.steps.s5_mesh.voxel_mesher import labels, voxel_surface
 
 
 @pytest.fixture(scope="module")

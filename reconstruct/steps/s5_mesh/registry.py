@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions
 
 MESHERS = {
-    "surface": "palpate.reconstruction.steps.s5_mesh.of_drawing",
-    "voxels": "palpate.reconstruction.steps.s5_mesh.of_voxels",
+    "surface": "palpate.reconstruction.steps.s5_mesh.surface_mesher",
+    "voxels": "palpate.reconstruction.steps.s5_mesh.voxel_mesher",
 }
 AUTO, USUAL = "auto", "surface"
 """The method chooses; where it does not, the usual one."""

@@ -19,8 +19,8 @@ from scipy.stats import theilslopes
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.depth_factors import DepthFactors
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.law_errors import DepthLaw, Level
 from palpate.mechanics.options import EXACT, option
-from palpate.mechanics.own_errors import DepthLaw, Level
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.statistics import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
 from palpate.reconstruction.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data

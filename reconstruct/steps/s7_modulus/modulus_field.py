@@ -31,9 +31,9 @@ from palpate.mechanics.compliance.smooth_field import (
 from palpate.mechanics.contact.edges import edge_law
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.effects import stiffness_field
+from palpate.mechanics.law_errors import DepthLaw, Level
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.options import option
-from palpate.mechanics.own_errors import DepthLaw, Level
 from palpate.mechanics.presses.table import Presses
 from palpate.reconstruction.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
 

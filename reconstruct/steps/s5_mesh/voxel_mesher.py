@@ -1,5 +1,6 @@
 """fTetWild by the paper's volumetric detour: a grid labelled inside or outside, and the surface between the
-labels (section 2.2)."""
+labels (section 2.2).
+"""
 
 from __future__ import annotations
 

@@ -7,8 +7,8 @@ from dataclasses import fields
 from typing import get_args
 
 from palpate.diagnosis.options import NuisanceOptions
-from palpate.mechanics import own_errors
-from palpate.mechanics.own_errors import (
+from palpate.mechanics import law_errors
+from palpate.mechanics.law_errors import (
     ERRORS,
     DepthLaw,
     Direction,
@@ -35,7 +35,7 @@ def test_every_number_states_its_unit_what_it_is_of_and_its_source():
 
 def test_no_error_is_left_out_of_the_table():
     written = {
-        c for c in vars(own_errors).values() if inspect.isclass(c) and c.__module__ == own_errors.__name__
+        c for c in vars(law_errors).values() if inspect.isclass(c) and c.__module__ == law_errors.__name__
     }
     assert written - {OwnError} == set(ERRORS)
     assert all(isinstance(n, OwnError) for e in ERRORS for k, n in vars(e).items() if not k.startswith("_"))
