@@ -2,7 +2,7 @@
 
 All numbers that decide a name are in `AttributionOptions`; beside them stand the weights of evidence and
 closure, fitted to cases of known truth (search/naming.toml). Widths of our own errors default to their table
-(mechanics.own_errors).
+(mechanics.law_errors).
 """
 
 from __future__ import annotations

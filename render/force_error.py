@@ -1,6 +1,6 @@
 """What a rendered force may be off by: the law itself, the felt shape, where the first touch lay.
 
-Half widths of 95 % intervals, N. The law's own share of the force (mechanics.own_errors.Bound) grows with the
+Half widths of 95 % intervals, N. The law's own share of the force (mechanics.law_errors.Bound) grows with the
 depth, on curved ground, beside rims and above the base, and where a push along the normal also moves the
 surface sideways.
 """

@@ -4,7 +4,7 @@ What evidence is weighed from: every form of a cause as a change of force, besid
 
 The likelihood is Gaussian and linear about the ideal model: the modulus is free; first touches, places and
 the law's own errors (those of one place and those that all places share) have widths of their own
-(mechanics.own_errors, diagnose.search.whiten); every form of a cause is a column, the change of force that it
+(mechanics.law_errors, diagnose.search.whiten); every form of a cause is a column, the change of force that it
 brings about.
 """
 

@@ -2,7 +2,7 @@
 
 The search is the one for physical effects (`diagnose.search`) with the numerical effects in its library. Its
 modulus is stated, not fitted; its noise is not a sensor's but what our own law may miss
-(mechanics.own_errors).
+(mechanics.law_errors).
 """
 
 from __future__ import annotations
