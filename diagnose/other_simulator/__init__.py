@@ -1,2 +1,3 @@
-"""The gap of another simulator: its forces on the recorded path (`forces`), what it was given (`stated`),
-what its numerics add (`against_law`), and the parts that the gap is made of (`parts`, `result`)."""
+"""The gap of another simulator: its forces on the recorded path (`forces`), what it was given
+(`declared_parameters`), what its numerics add (`against_law`), and the parts of the gap (`gap_decomposition`,
+`result`)."""

@@ -1,7 +1,6 @@
 """The search for effects.
 
-The gap is fitted in `descent`, from where `starts` says, against the noise that `whiten` knows; each set of
-effects is predicted on places left out (`leave_one_out`). `evidence` weighs what that says, `naming` decides
-when it names an effect, `attribution` picks effects step by step, `rivals` says what the sites cannot tell
-from them.
+`descent` fits the gap against the noise of `whiten`; `leave_one_out` predicts each set of effects at places
+left out. `evidence` weighs the outcome, `naming` decides when it names an effect, `attribution` picks effects
+step by step, `rivals` finds those that the sites cannot distinguish from them.
 """

@@ -95,8 +95,8 @@ def diagnose(
     presses: Annotated[
         int | None,
         option(
-            "run --renderer over so many of the recording's presses, spread over its places; default: of a "
-            "dear simulator 12, of the others all",
+            "run --renderer over so many of the recording's presses, spread over its places; default: 12 "
+            "of an expensive simulator, all of the others",
             low=LEAST_PRESSES,
         ),
     ] = None,
