@@ -44,12 +44,14 @@ def _add_engine(parser: argparse.ArgumentParser) -> None:
         "--memory",
         type=finite,
         metavar="NUMBER",
-        help="what they may take together [GB] (default: 90 %% of what is free)",
+        help="memory of all processes together [GB] (default: 90 %% of what is free)",
     )
     group.add_argument(
-        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://HOST:8786, in their place"
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address of a Dask cluster to use instead, such as tcp://HOST:8786",
     )
-    group.add_argument("--force", action="store_true", help="do what is finished again")
+    group.add_argument("--force", action="store_true", help="repeat what is finished")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

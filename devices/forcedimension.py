@@ -125,7 +125,7 @@ class ForceDimensionWire:
         """The specification with what the library does to a force."""
         words, most = [], spec.max_force_n
         if "dhdGetMaxForce" not in self._newer:
-            words.append("the library is too old to tell its force limit")
+            words.append("the library is too old to report its force limit")
         else:
             limit_n = float(self._library.dhdGetMaxForce(number))
             # negative: no limit is set
@@ -164,10 +164,10 @@ class ForceDimensionWire:
             x, y, z = (float(v) for v in force_on_tool_n)
             self._check(library.dhdSetForce(-y, x, z, number), "take a force")
         p, v = (c_double * 3)(), (c_double * 3)()
-        self._read(library.dhdGetPosition, p, "tell its position")
-        self._read(library.dhdGetLinearVelocity, v, "tell its velocity")
+        self._read(library.dhdGetPosition, p, "report its position")
+        self._read(library.dhdGetLinearVelocity, v, "report its velocity")
         status = (c_int * STATUS_LENGTH)()
-        self._check(library.dhdGetStatus(status, number), "tell its status")
+        self._check(library.dhdGetStatus(status, number), "report its status")
         # without forces nothing paces the library: do not spin
         time.sleep(max(0.0, PERIOD_S - (time.perf_counter() - started)))
         return Reading(

@@ -134,9 +134,11 @@ class HaplyWire:
         base = self.options.uri.replace("ws", "http", 1).rstrip("/")
         version = codec.version(_get(f"{base}/version"))
         scale = codec.number(_get(f"{base}/settings/devices/force_scale"))
-        words = [f"Inverse service {version}" if version else "the Inverse service does not tell its version"]
+        words = [
+            f"Inverse service {version}" if version else "the Inverse service does not report its version"
+        ]
         if scale is None:
-            words.append("its force scale is not told and taken as 1")
+            words.append("its force scale is not reported and taken as 1")
         elif not LEAST_SCALE <= scale <= MOST_SCALE:
             raise DeviceError(
                 f"the Inverse service scales forces by {scale:g}: set its devices/force_scale to 1"
@@ -146,7 +148,7 @@ class HaplyWire:
         self._scale = 1.0 if scale is None else scale
         damping = 0.0
         if shown is None:
-            words.append("it does not tell its filters and its mount")
+            words.append("it does not report its filters and its mount")
         else:
             _refuse_mirrored_or_scaled(shown)
             words += _declared(shown)
@@ -189,7 +191,7 @@ class HaplyWire:
         # the service answers in a fraction of a millisecond; asking faster than this only heats the processor
         time.sleep(max(0.0, LEAST_PERIOD_S - (time.perf_counter() - started)))
         if state is None:
-            raise OSError("the Inverse3 left the service")
+            raise OSError("the Inverse3 was disconnected from the service")
         fault = state.fault or (self._fault if self._clock() < self._fault_until_s else "")
         return Reading(
             np.array(state.position_m),
@@ -260,7 +262,8 @@ def _declared(shown: codec.HaplyConfig) -> list[str]:
         words.append(f"its damping filter of {shown.damping_n_s_per_m:g} N s/m acts on the hand as well")
     if shown.force_gate is not None:
         words.append(
-            f"its force gate (gain {shown.force_gate:g}) may weaken forces that oscillate: left on, it guards"
+            f"its force gate (gain {shown.force_gate:g}) may weaken forces that oscillate: it stays on, "
+            "as a safeguard"
         )
     if shown.gravity_compensation is not None and shown.gravity_compensation != 1.0:
         words.append(f"it carries {shown.gravity_compensation:g} of the arm's weight")

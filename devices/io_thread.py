@@ -211,7 +211,7 @@ class ThreadedDevice(OpenInWith):
             if self.wire.spec != before:
                 # the caller's limits were made for what it was
                 self.wire.disconnect()
-                raise DeviceError("it came back with other limits or settings: start anew")
+                raise DeviceError("it was reconnected with other limits or settings: start again")
         except Exception as error:  # still away: the state keeps saying so
             self._state = self._flagged(fault=_plain(error))
             return

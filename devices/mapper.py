@@ -29,8 +29,8 @@ class MapperOptions:
     """How a device's motion becomes the tip's. Sign and axis come from a right-handed triple."""
 
     axes: str = option("x,y,z", "device axes, with signs, that give the scene's x,y,z: for example x,-z,y")
-    scale: float = option(1.0, "scene metres a device metre", flag="--motion-scale")
-    force_scale: float = option(1.0, "device newtons a scene newton")
+    scale: float = option(1.0, "scene metres per device metre", flag="--motion-scale")
+    force_scale: float = option(1.0, "device newtons per scene newton")
     clutch_button: int = option(-1, "button that lifts the tool off the mapping; -1: none")
     reach_m: float = option(
         0.25, "how far from the scene's centre a rate device moves", unit="m", low=0.001, high=10.0

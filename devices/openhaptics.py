@@ -161,7 +161,7 @@ class OpenHapticsWire:
         values = (c_double * 16)()
         library.hdGetDoublev(NOMINAL_MAX_FORCE, values)
         if library.hdGetError().code or not 0.0 < values[0] < 1e3:
-            words.append(f"the driver does not tell its greatest force; {most:g} N is taken")
+            words.append(f"the driver does not report its greatest force; {most:g} N is taken")
         elif values[0] < most:
             most = float(values[0])
             words.append(f"the driver allows at most {most:g} N")

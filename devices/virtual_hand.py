@@ -55,7 +55,7 @@ class SimulatedOptions:
     mass_kg: float = option(0.15, "moving mass of hand and tool", unit="kg", flag="--hand-mass", low=0.001)
     damping_n_s_per_m: float = option(12.0, "the grasp's damping", unit="N s/m", flag="--hand-damping")
     stiffness_n_per_m: float = option(600.0, "the grasp's stiffness", unit="N/m", flag="--hand-stiffness")
-    tremor_m: float = option(2e-5, "tremor, rms an axis", unit="m", flag="--tremor", high=0.01)
+    tremor_m: float = option(2e-5, "tremor, rms per axis", unit="m", flag="--tremor", high=0.01)
 
     def __post_init__(self) -> None:
         check_ranges(self)

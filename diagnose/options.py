@@ -51,10 +51,14 @@ class AttributionOptions:
         0.5, "smallest gap that matters, rms over contact samples, of the noise of a force 3-vector"
     )
     least_of_first: float = option(
-        0.25, "least size of a further effect, of the first's: no law is exact, what it leaves is no effect"
+        0.25, "least size of a further effect, as a share of the first's size (no law is exact)"
     )
-    most: int | None = option(None, "effects in one answer, at most; None: 3, of a quick diagnosis 1")
-    z: float = option(5.0, "standard errors beyond which what free air or the support reads is no chance")
+    most: int | None = option(
+        None, "greatest number of effects in one answer; None: 3, of a quick diagnosis 1"
+    )
+    z: float = option(
+        5.0, "standard errors beyond which a reading in free air or on the support is not chance"
+    )
     shape_gain: float = option(
         12.0, "gain in log likelihood from which sites differ by more than their shape may"
     )

@@ -147,7 +147,7 @@ def search(
     clock.lap("effects")
     why += readings.not_weighed
     for name in sorted(seen - set(found.chosen)):
-        why.append(f"{name.replace('_', ' ')}: the presses do not bear that out, so it is not named")
+        why.append(f"{name.replace('_', ' ')}: the presses do not confirm it, so it is not named")
     offsets = dataclasses.replace(corrected.offsets, reasons=tuple(why))
     return Findings(
         forward, weighed, found, readings, offsets, site_sd, corrected.excluded,

@@ -31,7 +31,7 @@ print(understood)
 understood.plot()
 
 # %%
-# Before it is believed, it is checked: noise, delay, saturation, clipped or missing samples, ...
+# Before a model is made of it, it is checked: noise, delay, saturation, clipped or missing samples, ...
 
 print(pp.check(understood.recording))
 

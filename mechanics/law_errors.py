@@ -18,10 +18,10 @@ Reach = Literal["sample", "press", "place", "neighbours", "all places"]
 """Within what an error is one number: it is drawn anew for the next sample, press, place; or for none."""
 
 _SET = "set by hand, no measurement is on record"
-_DIAGNOSIS = f"{_SET} (docs/decisions/0080); the weights of naming were fitted beside it"
+_DIAGNOSIS = f"{_SET} (docs/decisions/0080); the weights of naming were fitted with it"
 _EXPLORING = f"{_SET}; without errors that places share, sound silicones lose 'none' (docs/decisions/0150)"
 _PLANNING = f"{_SET}; it ranks touches that are still to be made (docs/decisions/0150)"
-_SIMULATOR = f"{_SET}; names were held against sealed flaws beside it (`palpate bench simulated`)"
+_SIMULATOR = f"{_SET}; names were tested on sealed flaws with it (`palpate bench simulated`)"
 _PIECES = f"{_SET}, for a machine's curves at the size of a hand (docs/decisions/0120)"
 _BOUND = "fitted to solved presses at places of known shapes (`palpate bench law-bound`)"
 
@@ -88,11 +88,13 @@ class Stiffness:
 class Repeats:
     """Share by which presses of one place differ in stiffness."""
 
-    diagnosis = OwnError(0.01, "1", "stiffness of a press beside its repeats", "press", _DIAGNOSIS)
+    diagnosis = OwnError(0.01, "1", "stiffness of a press compared with its repeats", "press", _DIAGNOSIS)
     verdict = OwnError(
-        0.01, "1", "stiffness of a place, beside noise: the option does not tune it", "press", _SET
+        0.01, "1", "stiffness of a place, in addition to noise: the option does not tune it", "press", _SET
     )
-    simulator = OwnError(0.005, "1", "stiffness of a simulated press beside its repeats", "press", _SIMULATOR)
+    simulator = OwnError(
+        0.005, "1", "stiffness of a simulated press compared with its repeats", "press", _SIMULATOR
+    )
     pieces = OwnError(0.07, "1", "stiffness of pieces, one a press", "press", _PIECES)
 
 
@@ -164,7 +166,7 @@ class Slip:
 class Latency:
     """When the force is read."""
 
-    common = OwnError(0.5e-3, "s", "time of the force beside the position", "all places", _EXPLORING)
+    common = OwnError(0.5e-3, "s", "time of the force relative to the position", "all places", _EXPLORING)
 
 
 class Unnamed:

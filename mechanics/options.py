@@ -16,7 +16,7 @@ from palpate.mechanics.disk.schema import span
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.plausible import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 
-EXACT = "solve each touched place in place of reading the table (some 10 s of processor time a place)"
+EXACT = "solve each touched place instead of reading the table (about 10 s of CPU time per place)"
 """Help of `exact`, wherever it is an option."""
 _BY_NAME = {
     "mesh_size_m": (5e-4, 0.2),
@@ -113,7 +113,8 @@ def check_range(field: dataclasses.Field[Any], value: Any, name: str | None = No
     number: Any = value
     low, high = span_of(field)
     if not low <= number <= high:
-        words = span(low, high, field.metadata["unit"])
+        unit = field.metadata["unit"]
+        words = span(low, high, "" if unit == "1" else unit)
         raise OptionError(f"{name or field.name} is {str(number)[:30]}; allowed are numbers{words}")
 
 

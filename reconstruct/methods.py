@@ -53,7 +53,7 @@ class ReconstructOptions:
         None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
     )
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
-    force: bool = option(False, "go on although the check-up finds something grave")
+    force: bool = option(False, "continue although the check-up has a grave finding")
     filter: FilterOptions = field(default_factory=FilterOptions)
     boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
     contact: ContactOptions = field(default_factory=ContactOptions)

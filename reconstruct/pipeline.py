@@ -90,7 +90,7 @@ class Reconstruction(Result):
 
     @property
     def doubt(self) -> str:
-        """Why the answer is not to be believed, in one line: the known shape is another object's, or places
+        """Why the answer is not reliable, in one line: the known shape is another object's, or places
         that were held out are not predicted. '' where nothing speaks against it."""
         by_shape = "" if self.placed is None else self.placed.doubt
         by_force = "" if self.held_out is None else self.held_out.doubt

@@ -57,7 +57,7 @@ def press_options(renderer: FemRenderer) -> PressOptions:
 def check_renderer(name: str) -> None:
     """Raise OptionError for a renderer whose law no press is solved beside."""
     if name != FemRenderer.name:
-        raise OptionError(f"--exact solves presses beside the law of '{FemRenderer.name}', not of '{name}'")
+        raise OptionError(f"--exact solves presses with the law of '{FemRenderer.name}', not of '{name}'")
 
 
 class ExactPlaces:

@@ -33,17 +33,18 @@ class RenderOptions:
     )
     surface_edge_m: float = option(2.5e-3, "edge of the contact surface's triangles", unit="m")
     interpolation: str = option(
-        "rbf", "of 1D parameters over the surface", choices=("rbf", "nearest"), flag="--interpolation"
+        "rbf",
+        "interpolation of the 1D parameters over the surface",
+        choices=("rbf", "nearest"),
+        flag="--interpolation",
     )
 
     simulator_settings: str = option(
         DOCUMENTED,
-        "of another simulator: as its own documentation says, or as good as it gets",
+        "settings of another simulator: as its documentation says, or the most accurate",
         choices=SETTINGS,
     )
-    simulator_set: str = option(
-        "", "numbers of another simulator's settings to change: KEY=VALUE, comma separated"
-    )
+    simulator_set: str = option("", "settings of another simulator to change: KEY=VALUE, comma separated")
 
     def __post_init__(self) -> None:
         if self.friction is not None and (math.isnan(self.friction) or self.friction < 0):

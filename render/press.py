@@ -207,7 +207,7 @@ def first_touch(
         raise OptionError(
             f"a tip of radius {radius} m aimed at {at.tolist()} along {np.round(direction, 4).tolist()} does "
             f"not meet the touchable surface (object within {np.round(low, 4).tolist()} to "
-            f"{np.round(high, 4).tolist()} m), nor a support close beside it"
+            f"{np.round(high, 4).tolist()} m), nor a support next to it"
         )
     return min((found for found in (on_object, beside) if found is not None), key=lambda f: f[0] @ direction)
 

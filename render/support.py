@@ -25,7 +25,7 @@ CREEP_M_PER_S = 0.005
 class SupportOptions:
     """What the plane beside the object feels like, in every command that renders a model."""
 
-    support: bool = option(True, "the support is felt as a rigid plane beside the object")
+    support: bool = option(True, "the support is felt as a rigid plane around the object")
     support_stiffness_n_per_m: float = option(
         1500.0, "the support's stiffness, or the device's", unit="N/m", high=1e5, looser="higher"
     )

@@ -129,7 +129,7 @@ class ExplorationOptions:
     tracing_speed_m_per_s: float = option(0.03, "speed along the base", unit="m/s")
     turns: float = option(1.1, "turns around the base")
     lean_m: float = option(0.0002, "how far the tracing leans into the object", unit="m")
-    bear_down_m: float = option(0.0004, "how far the tracing bears down on the support", unit="m")
+    bear_down_m: float = option(0.0004, "how far the tracing presses into the support", unit="m")
     clearance_m: float = option(0.010, "distance from the surface between presses", unit="m")
 
 

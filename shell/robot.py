@@ -105,10 +105,10 @@ def serve(
 class RobotOptions:
     """How well it does what it is told: standard deviations."""
 
-    place_error_m: float = option(0.001, "sideways, of where it presses", unit="m")
-    way_error_deg: float = option(4.0, "of the direction in which it comes", unit="deg")
-    depth_error: float = option(0.08, "of the depth, as a share of it")
-    speed_error: float = option(0.15, "of the speed, as a share of it")
+    place_error_m: float = option(0.001, "sideways error of the pressed place", unit="m")
+    way_error_deg: float = option(4.0, "error of the approach direction", unit="deg")
+    depth_error: float = option(0.08, "error of the depth, as a share of the depth")
+    speed_error: float = option(0.15, "error of the speed, as a share of the speed")
 
 
 JOIN_S = 0.25
@@ -174,7 +174,7 @@ class LaboratoryRobot:
         forgets = all(effect(name).forgets for name in self.effects)
         if self.made and not forgets:
             raise SceneError(
-                "an exploration of this phantom cannot be gone on with: its effects remember earlier touches"
+                "an exploration of this phantom cannot be continued: its effects remember earlier touches"
             )
         new = self._touches[-2:] if forgets else self._touches
         made = self._simulated(

@@ -75,10 +75,10 @@ def calibrate_on_plate(measured: Measured) -> Calibration:
     unlike = _unlike(shifted[_DELAYS_S[best]][rows] @ plate, travel, sense, each)
     if stiff and unlike > _UNLIKE:
         raise ContactError(
-            f"what yields differs from press to press by {100 * unlike:.0f} % of {1e3 * give:.3g} mm/N, and "
-            f"a tool on a rigid plate yields alike at every place (to {100 * _UNLIKE:.0f} %): this is no "
-            "rigid plate, or it moves; press a clamped plate of metal or glass, or give --modulus of a known "
-            "object"
+            f"the compliance differs from press to press by {100 * unlike:.0f} % of {1e3 * give:.3g} "
+            "mm/N, and a tool on a rigid plate has the same compliance at every place (to "
+            f"{100 * _UNLIKE:.0f} %): this is no rigid plate, or it moves; press a clamped plate of metal or "
+            "glass, or give --modulus of a known object"
         )
     interval: dict[str, Any] = {"delay_s": [delay - 1.96 * delay_sd, delay + 1.96 * delay_sd]}
     if stiff:
@@ -101,7 +101,7 @@ def calibrate_on_plate(measured: Measured) -> Calibration:
             "presses": len(u),
             "normal": plate.tolist(),
             "sideways_reading_per_newton": lean.tolist(),
-            "not_told": absent + ([] if stiff else ["tool's bending: stiffer than can be told"]),
+            "not_told": absent + ([] if stiff else ["tool's bending: too stiff to be measured"]),
         },
     )
 

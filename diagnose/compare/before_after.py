@@ -117,7 +117,7 @@ class Changes(Result):
             return f"what differs is {effects}"
         if _OBJECT not in self.explained_by:
             return f"explained by {effects}" if effects else "nothing explains it"
-        return "the object itself differs" + (f", beside {effects}" if effects else "")
+        return "the object itself differs" + (f", in addition to {effects}" if effects else "")
 
 
 def _more(ratio: float) -> str:
@@ -143,15 +143,19 @@ def changes(before: Side, after: Side) -> Changes:
     if abs(log) > _95 * sd:
         if causes and beside is not None and abs(np.log(beside[0])) <= max(_HALVES * abs(log), _95 * sd):
             explained = causes
-            reasons.append(f"beside its effects the modulus differs by {100 * (beside[0] - 1):+.0f} % only")
+            reasons.append(
+                "with its effects taken into account the modulus differs by "
+                f"{100 * (beside[0] - 1):+.0f} % only"
+            )
         else:
             explained = [_OBJECT, *causes]
             if beside is not None:
                 shift = f"{100 * (beside[0] - 1):+.0f} %"
                 reasons.append(
-                    f"beside the effects of both the moduli still differ by {shift}"
+                    f"with the effects of both taken into account the moduli still differ by {shift}"
                     if causes
-                    else f"no effect that only one has could bring it about: {shift} beside those of both"
+                    else f"no effect that only one has explains it: {shift} with those of both taken "
+                    f"into account"
                 )
     else:
         explained = causes

@@ -39,15 +39,16 @@ class CompareOptions:
     site_m: float | None = option(
         None, "presses closer than this are one site; None: as reconstructed", unit="m", flag="--site-size"
     )
-    interpolation: str = option("rbf", "of the 1D parameters", choices=("rbf", "nearest"))
+    interpolation: str = option("rbf", "interpolation of the 1D parameters", choices=("rbf", "nearest"))
     field: str = option(
         "auto",
-        "a field of the modulus in the FEM: where the presses ask for one, or never",
+        "a field of the modulus in the FEM: where the presses show one, or never",
         choices=("auto", "homogeneous"),
     )
     first_touch: str = option(
         "read",
-        "of held-out presses: as read, or moved by what its stated error allows, for every model alike",
+        "first touch of held-out presses: as read, or moved by what its stated error allows, for every "
+        "model alike",
         choices=("read", "moved"),
     )
 
@@ -201,7 +202,7 @@ def _folds(site: np.ndarray, most: int, seed: int) -> np.ndarray:
     folds = min(most, len(sites))
     if folds < 2:
         raise ContactError(
-            f"{len(sites)} site was palpated: a comparison holds some out and needs 2 at least"
+            f"{len(sites)} site was palpated: a comparison holds some out and needs at least 2"
         )
     fold_of_site = np.random.default_rng(seed).permutation(np.arange(len(sites)) % folds)
     return fold_of_site[np.searchsorted(sites, site)]
@@ -295,13 +296,13 @@ def regions(model: Model, points: np.ndarray, normals: np.ndarray) -> list[HeldO
     if len(top):
         centre[top] = out[top] < min(0.55 * inscribed, np.quantile(out[top], 0.5) + 1e-6)
     found = [
-        HeldOutRegion("top-centre", "the inner part of the top; seen: the rest, towards the rim", centre),
-        HeldOutRegion("top", "the whole top; seen: the side", faces_up),
+        HeldOutRegion("top-centre", "the inner part of the top; fitted: the rest, towards the rim", centre),
+        HeldOutRegion("top", "the whole top; fitted: the side", faces_up),
         HeldOutRegion(
-            "base-band", "the lowest 35 % of the side; seen: what is above", ~faces_up & (h < 0.35)
+            "base-band", "the lowest 35 % of the side; fitted: the rest above", ~faces_up & (h < 0.35)
         ),
         HeldOutRegion(
-            "corners", "beyond the largest circle in the outline; seen: what is inside", out > 1.1 * inscribed
+            "corners", "beyond the largest circle in the outline; fitted: the rest", out > 1.1 * inscribed
         ),
     ]
     return [r for r in found if r.members.sum() >= LEAST_HELD and (~r.members).sum() >= LEAST_SEEN]

@@ -126,18 +126,18 @@ LIGHT_M = 0.0025
 class ReachOptions:
     """What the hand or the robot may do."""
 
-    deepest_m: float = option(0.006, "never press deeper", unit="m", flag="--deepest")
+    deepest_m: float = option(0.006, "greatest depth of a press", unit="m", flag="--deepest")
     deepest_share: float = option(
-        0.18, "nor deeper than this share of the material under the tip", low=0.01, high=0.9
+        0.18, "greatest depth of a press as a share of the material under the tip", low=0.01, high=0.9
     )
     strongest_n: float = option(
-        5.0, "nor with more force, as far as it is known", unit="N", flag="--strongest", low=0.01
+        5.0, "greatest force of a press, as far as it is known", unit="N", flag="--strongest", low=0.01
     )
     press_speed_m_per_s: float = option(0.02, "speed of a press", unit="m/s")
     air_speed_m_per_s: float = option(0.12, "speed through the air", unit="m/s")
     hold_s: float = option(0.2, "how long a press is held", unit="s")
     clearance_m: float = option(0.012, "height above the surface where a press begins", unit="m")
-    between_s: float = option(0.5, "what it takes to begin another touch", unit="s")
+    between_s: float = option(0.5, "time before the next touch begins", unit="s")
 
 
 @dataclass(frozen=True)

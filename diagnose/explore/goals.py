@@ -25,15 +25,15 @@ class GoalOptions:
         0.002, "where 95 % of the surface must lie within", unit="m", flag="--surface-within"
     )
     cause_at: float | None = option(
-        None, "how surely one cause alone must be left, or none (0.95)", flag="--cause-at"
+        None, "probability that one cause alone, or none, explains the touches (0.95)", flag="--cause-at"
     )
     complete: bool = option(
         False,
-        "at the end, press the bare support, wave, and trace the base once more: what tells the instrument "
-        "from the object, and whether it moved",
+        "at the end, press the bare support, wave, and trace the base once more: this separates the "
+        "instrument from the object, and shows whether it moved",
         flag="--complete",
     )
-    most: int = option(40, "never more presses than these, nor tracings", flag="--most")
+    most: int = option(40, "greatest number of presses, and of tracings", flag="--most")
 
     def __post_init__(self) -> None:
         """Raises OptionError for goals that cannot be."""
@@ -93,4 +93,4 @@ def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def check_goals(goals: GoalOptions) -> None:
     """Raises OptionError where nothing is asked for."""
     if goals.modulus_within is None and goals.surface_within_m is None and goals.cause_at is None:
-        raise OptionError("no goal is given: ask for --modulus-within, --surface-within or --cause-at")
+        raise OptionError("no goal is given: give --modulus-within, --surface-within or --cause-at")

@@ -92,11 +92,11 @@ def join(instrument: Instrument, segments: list[Segment]) -> Recording:
     RecordingError where there is no segment, or where some hold the tool's orientation and others do not.
     """
     if not segments:
-        raise RecordingError("nothing was felt yet: add a segment first")
+        raise RecordingError("there are no touches yet: add a segment first")
     turned = [s.quaternion is not None for s in segments]
     if any(turned) and not all(turned):
         raise RecordingError(
-            "some segments tell the tool's orientation and some do not: send it always or never"
+            "some segments give the tool's orientation and some do not: send it always or never"
         )
     step = 1.0 / instrument.sample_rate_hz
     clocks, phase, now = [], None, 0.0

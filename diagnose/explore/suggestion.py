@@ -228,7 +228,7 @@ def _why(s: Situation, best: TouchCandidate) -> str:
     if best.for_goal == "modulus":
         now = goals["modulus"]
         return (
-            f"the modulus is known within {100 * now.now:.0f} % and {100 * now.goal:.0f} % is asked for: "
+            f"the modulus is known within {100 * now.now:.0f} % and {100 * now.goal:.0f} % is the goal: "
             "this place shares least with those pressed"
         )
     now = goals["surface"]

@@ -40,7 +40,7 @@ def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
     """
     if len(presses) < LEAST_PRESSES:
         raise DiagnosisError(
-            f"the model has {len(presses)} palpations; a diagnosis holds sites out and needs at least "
+            f"the model has {len(presses)} palpations; a diagnosis holds some sites out and needs at least "
             f"{LEAST_PRESSES}"
         )
     if not presses.sampled:

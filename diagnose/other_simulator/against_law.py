@@ -122,8 +122,8 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
     ]  # fmt: skip
     if remainder:
         reasons.append(
-            f"the simulator's force is {1e3 * missed:.0f} mN from our law even with what is named: something "
-            "else is in its numerics, or it was given other parameters than those stated"
+            f"the simulator's force is {1e3 * missed:.0f} mN from our law even with the named effects: "
+            "something else is in its numerics, or it was given other parameters than those stated"
         )
     limits = {n: max(x, LEAST_SHARE * typical) for n, x in _limits(search, found, tried).items()}
     forward.touches = t

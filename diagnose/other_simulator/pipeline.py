@@ -77,7 +77,7 @@ def diagnose_simulated(
     progress("forces", 0.0)
     presses = presses_on(recording, model)
     if presses.quasi_static:
-        raise DiagnosisError("points without a time have no path that a simulator could follow")
+        raise DiagnosisError("points without a time are not a path that a simulator can follow")
     given = aligned(asked.forces, presses, asked.options)
     if reality is None:
         reality = diagnose(

@@ -46,11 +46,13 @@ def advice_of(
         which = "" if name in numerics.named else "or "
         said.append(f"{which}{name.replace('_', ' ')}: {words}")
     if unstated:
-        said.append("or stated modulus: nobody said what it was given; say it: --stated young_modulus_pa=PA")
+        said.append(
+            "or stated modulus: what the simulator was given is not stated; give --stated young_modulus_pa=PA"
+        )
     said += [f"{p.name.replace('_', ' ')}: {parameter_words(p, poisson_limit)}" for p in wrong]
     for name in real:
         said.append(
-            f"{name.replace('_', ' ')}: no setting of an ideal elastic simulation has it; "
+            f"{name.replace('_', ' ')}: no setting of an ideal elastic simulation contains it; "
             "'palpate diagnose REC --apply MODEL2' writes a model that does"
         )
     return tuple(said)

@@ -59,7 +59,7 @@ _WIDE = 0.1
 """Share of the work that may stay away in a solid whose modulus is one number."""
 _LOOP = (
     "a loop so wide, or a force that fades while the tip rests, is creep, a late force or play: press more "
-    "slowly and hold to tell them; a slow press may be as much softer as the interval says"
+    "slowly and hold to separate them; a slow press may be as much softer as the interval says"
 )
 _ALIKE = 1.1
 """The interval of a few curves covers laws that miss at most so many times what the best misses."""

@@ -187,7 +187,7 @@ def _indentation(
     holds = unseen_holds(bench, made)
     if holds is not None:
         error |= {"ideal, holds": holds[0], "verdict, holds": holds[1]}
-        notes.append(f"of unseen holds {100 * (1 - (holds[1] / holds[0]) ** 2):.0f} % is closed")
+        notes.append(f"of held-out holds {100 * (1 - (holds[1] / holds[0]) ** 2):.0f} % is explained")
     if bench.specimens:
         modulus, interval = float(np.median(own)), tuple(map(float, np.quantile(own, [0.025, 0.975])))
     else:

@@ -76,7 +76,7 @@ def answer_of(findings: Findings, counts: np.ndarray) -> Answer:
     # with nothing named the gap is there all the same
     answer.remainder = answer.remainder or (lone and not answer.names)
     if not answer.names and not answer.remainder:
-        answer.reasons.append("what is left is no larger than noise, first touch and shape can explain")
+        answer.reasons.append("the remaining gap is no larger than noise, first touch and shape can explain")
     if misfit:
         answer.reasons.append(
             f"the best answer still misses by {np.sqrt(found.final.chi):.1f} times the noise: something else "
@@ -98,7 +98,7 @@ def _misfit(findings: Findings, counts: np.ndarray, answer: Answer) -> tuple[boo
     # one touch that slipped or met something else is no law that is missing
     x, y, z = 1e3 * findings.forward.touches.site_point[site]
     answer.reasons.append(
-        f"the touches at ({x:.0f}, {y:.0f}, {z:.0f}) mm fit nothing, the others miss by "
+        f"the touches at ({x:.0f}, {y:.0f}, {z:.0f}) mm fit no effect, the others miss by "
         f"{np.sqrt(rest):.1f} times the noise: touch there again"
     )
     return False, True
@@ -131,7 +131,7 @@ def _finite_strain(findings: Findings, answer: Answer) -> None:
         )
         return
     if likelier:
-        answer.reasons.append("finite strain closes nothing at places that were not fitted: it is not named")
+        answer.reasons.append("finite strain does not shrink the gap at held-out places: it is not named")
     if any(effect(n).hints.stands_for_strain for n in found.chosen):
         # deep enough for it, and it fitted no worse than the linear law until another took its place
         if strain in (*found.final.found.effects, *found.base.found.effects):
@@ -156,7 +156,7 @@ def _unconfirmed_lump(findings: Findings, answer: Answer) -> None:
         lives_in_few = name in scores and scores[name].effect.hints.few_places
         if lives_in_few and name in found.chosen and scores[name].closes <= 0:
             answer.candidates += _rest()
-            answer.reasons.append("one place alone tells of the lump: the shape may be wrong there instead")
+            answer.reasons.append("only one place shows the lump: the shape may be wrong there instead")
 
 
 def _shape(findings: Findings, answer: Answer) -> None:

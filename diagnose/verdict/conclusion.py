@@ -120,7 +120,7 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
         # resamples of the share may say what those of the growth left open: then nothing is named either
         answer.candidates[:0] = answer.names
         answer.names, answer.remainder, after_n = [], True, before_n
-        answer.reasons.append("the gap grows with what would be named on places that were not fitted")
+        answer.reasons.append("at held-out places the gap grows with the effects that would be named")
     if not answer.names:
         closed, interval = (0.0, (0.0, 0.0)) if before_n > noise else (None, None)
     answer.reasons += _with_all_places(findings, answer, gaps, counts, closed)

@@ -84,9 +84,7 @@ def without_what_makes_it_worse(
         answer.candidates += kept.dropped if kept.unexplained else ()
         answer.remainder |= kept.unexplained
         dropped = " and ".join(n.replace("_", " ") for n in kept.dropped)
-        answer.reasons.append(
-            f"{dropped}: the gap grows with it on places that were not fitted, so it is not named"
-        )
+        answer.reasons.append(f"{dropped}: at held-out places the gap grows with it, so it is not named")
     return kept.after
 
 

@@ -83,7 +83,7 @@ def compress(
             break
         if loads >= most:
             raise MeshError(
-                f"{loads} load patterns leave an error of {errors[-1]:.2g} where {tolerance:.2g} was asked: "
+                f"{loads} load patterns leave an error of {errors[-1]:.2g} where {tolerance:.2g} is allowed: "
                 "take a wider patch or a larger tolerance"
             )
     rank = int(np.argmax(errors <= max(tolerance, errors[-1]))) + 1

@@ -57,7 +57,7 @@ def reading(path: Path | str, error: type[PalpateError] = FileError) -> Iterator
     except PalpateError:
         raise
     except EOFError as refused:
-        raise error(f"'{path}' is not whole, it was cut off: copy it again") from refused
+        raise error(f"'{path}' is truncated: copy it again") from refused
     except (gzip.BadGzipFile, zlib.error) as refused:
         raise error(f"'{path}' cannot be unpacked ({refused}): it is damaged; copy it again") from refused
     except OSError as refused:
@@ -114,7 +114,7 @@ def read_text(path: Path | str, error: type[PalpateError] = FileError) -> str:
     with reading(path, error), open(path, "rb") as file:
         data = file.read(_TEXT_BYTES + 1)
     if len(data) > _TEXT_BYTES:
-        raise error(f"'{path}' is larger than {_TEXT_BYTES >> 20} MB: it is no text of this program's")
+        raise error(f"'{path}' is larger than {_TEXT_BYTES >> 20} MB: it is not a text file of this program")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as wrong:
@@ -137,7 +137,7 @@ def read_toml(path: Path | str, error: type[PalpateError] = FileError) -> dict[s
             for below in (value.values() if isinstance(value, dict) else value)
         ]
     if level:
-        raise error(f"'{path}' is nested more than {_DEEPEST} deep: no table of this program's is")
+        raise error(f"'{path}' is nested more than {_DEEPEST} deep: it is not a table of this program")
     return table
 
 

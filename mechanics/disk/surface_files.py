@@ -106,7 +106,7 @@ def _closed(shell: trimesh.Trimesh, name: str, unit: str) -> ClosedSurface:
     if shell.volume < 0:
         shell.invert()
     if not shell.volume > 1e-6 * size**3:
-        raise SurfaceError(f"'{name}' encloses no volume: a solid object is needed, no sheet")
+        raise SurfaceError(f"'{name}' encloses no volume: a solid object is needed, not a sheet")
     vertices = np.asarray(shell.vertices) * UNITS[unit]
     return ClosedSurface(vertices, np.asarray(shell.faces, dtype=np.int64), name, notes)
 

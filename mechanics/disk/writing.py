@@ -263,7 +263,7 @@ def _target(path: Path, kind: Kind | FolderKind) -> Path:
         if not target.is_dir():
             raise FileError(f"'{path}' exists and is no folder: {other}")
         if target in (here := Path.cwd(), *here.parents):
-            raise FileError(f"'{path}' is the current folder or holds it: name a folder to be made")
+            raise FileError(f"'{path}' is the current folder or holds it: name a new folder")
     elif target.is_dir():
         raise FileError(f"'{path}' is a folder: name a file")
     elif not target.is_file():

@@ -44,10 +44,10 @@ class Scope(Enum):
 class Role(Enum):
     """How a diagnosis comes to an effect."""
 
-    SEARCHED = "tried, alone and beside others"
+    SEARCHED = "tried, alone and with others"
     FREE_AIR = "found in free air before any press is looked at"
-    KNOWN = "known physics without a parameter: in every solid, so that only its size is asked"
-    REST = "what is left between places where nothing else explains them"
+    KNOWN = "known physics without a parameter: in every solid, so that only its size is estimated"
+    REST = "remaining differences between places that nothing else explains"
 
 
 @dataclass(frozen=True)

@@ -54,14 +54,14 @@ def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
 
 
 def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
-    # the rate of a contact as wide as the tip is what a fit tells, at any scale
+    # the rate of a contact as wide as the tip is what a fit gives, at any scale
     diffusivity = float(np.exp(values[1])) * scene.tip_radius**2
     return {"share": float(values[0]), "diffusivity_m2_per_s": diffusivity}
 
 
 def _in_words(keys: Keys) -> str:
     return (
-        f"the fluid first bears {100 * keys['share']:.0f} % beside the solid, and drains at "
+        f"the fluid first adds {100 * keys['share']:.0f} % to the solid's force, and drains at "
         f"{1e6 * keys['diffusivity_m2_per_s']:.3g} mm²/s"
     )
 

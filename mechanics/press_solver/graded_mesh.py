@@ -192,7 +192,7 @@ def graded_mesh(
         if not too_long.any():
             break
         if len(tets) > _MOST_TETRAHEDRA:
-            raise MeshError(f"a graded mesh grew beyond {_MOST_TETRAHEDRA} tetrahedra: ask for less fineness")
+            raise MeshError(f"a graded mesh grew beyond {_MOST_TETRAHEDRA} tetrahedra: use a coarser mesh")
         split = _splittable(of_tet, longest, too_long, len(ends))
         points, tets, fixed, parent = _bisected(points, tets, fixed, parent, (ends, longest, split), surface)
     flat = TetMesh(points, tets, fixed, ~fixed)

@@ -49,7 +49,9 @@ class _Bounded(io.RawIOBase):
         count = self._file.readinto(buffer)
         self._left -= count
         if self._left < 0:
-            raise RecordingError(f"'{self._path}' unpacks to more than any recording holds: it is none")
+            raise RecordingError(
+                f"'{self._path}' unpacks to more than any recording holds: it is not a recording"
+            )
         return count
 
     def close(self) -> None:

@@ -52,8 +52,8 @@ def _followed(data: Samples, peak: float) -> Finding:
     miss = float(filtered.spread.min())
     return Finding(
         "drift",
-        f"in the air the force wanders by {wander:.2g} N rms, as a tool's weight does that turns unseen; it "
-        "is followed from one touch to the next",
+        f"in the air the force wanders by {wander:.2g} N rms, as the weight of a tool does whose "
+        "rotation is not logged; it is followed from one touch to the next",
         f"over a touch to within {miss:.2g} N an axis, {100 * miss / peak:.0f} % of what a press peaks at",
         "log the tool's orientation, let the sensor warm up",
         miss / max(peak, 1e-9),
@@ -76,7 +76,7 @@ def delay(data: Samples) -> Iterator[Finding]:
     yield Finding(
         "delay",
         f"the force reads {late * 1e3:.0f} +- {error * 1e3:.0f} ms {way}; "
-        + ("that is taken off" if mended else f"up to {_LATEST_S * 1e3:.0f} ms is taken off"),
+        + ("that is corrected" if mended else f"up to {_LATEST_S * 1e3:.0f} ms is corrected"),
         f"{late / error:.0f} standard errors, {data.late.presses} touches that pass one place twice",
         "log position and force by one clock, or shift the force's times",
         1.5 * error / max(rise_s, error) if mended else np.inf,

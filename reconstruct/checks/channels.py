@@ -62,7 +62,7 @@ def _dead(data: Samples) -> Iterator[Finding]:
         f"{', '.join(names)}: no signal (from {', '.join(_unit(k, values[:, k].min()) for k in dead)} to "
         f"{', '.join(_unit(k, values[:, k].max()) for k in dead)} in {len(values)} samples)",
         "certain where nothing changes; in contact no more than its own noise otherwise",
-        "check the cable and the driver of that axis, and record anew",
+        "check the cable and the driver of that axis, and record again",
         np.inf,
         np.inf,
         _greatest(data),
@@ -136,7 +136,7 @@ def _stuck(data: Samples) -> Iterator[Finding]:
         f"{', '.join(names)} stand still for {seconds:.3g} s from {data.t[a * size]:.1f} s on, while the "
         "rest goes on" + (f"; {lost} of {len(data.spans)} touches lie there" if lost else ""),
         p_words(decades),
-        "cut that stretch out of the recording, or record anew",
+        "cut that stretch out of the recording, or record again",
         np.inf if share > _MOST_STUCK else max(float(share), 0.02),
         decades,
         (begin, end),
@@ -199,7 +199,7 @@ def _limited(data: Samples) -> Iterator[Finding]:
         "clipped",
         f"{words} ends at {top:.4g} N {where}",
         p_words(decades),
-        "press less hard or take a sensor with a wider range; samples at the limit say nothing",
+        "press less hard or take a sensor with a wider range; samples at the limit carry no information",
         float(max(count / max(among, 1), 0.02)),
         decades,
         (float(data.recording.t[a]), float(data.recording.t[b - 1])),

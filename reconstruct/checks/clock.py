@@ -40,7 +40,7 @@ def _rate(data: Samples) -> Iterator[Finding]:
         "rate",
         f"sample_rate_hz is {stated:g}, but the samples are {1e3 / own:.4g} ms apart ({own:.4g} Hz)",
         f"{100 * agree:.2g} % of {len(dt)} intervals agree with the stated rate",
-        f"state sample_rate_hz = {own:.4g}, or mend t",
+        f"state sample_rate_hz = {own:.4g}, or correct t",
         float(off),
         np.inf,
         (float(data.recording.t[0]), float(data.recording.t[-1])),
@@ -72,7 +72,7 @@ def _gaps(data: Samples) -> Iterator[Finding]:
         f"{many} in time, {lost:.3g} s without samples of {span + lost:.3g} s, the longest "
         f"{dt[longest]:.3g} s after {data.t[longest]:.2f} s; {inside.sum()} within touches",
         f"{dt[longest] / typical:.3g} times the usual interval",
-        "record anew, or cut the recording at the gap",
+        "record again, or cut the recording at the gap",
         float(share),
         np.inf,
         (float(at[0]), float(at[1])),

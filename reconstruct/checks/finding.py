@@ -48,7 +48,7 @@ class Finding:
 
     @property
     def grave(self) -> bool:
-        """Whether the modulus is not to be believed."""
+        """Whether the modulus is not reliable."""
         return not self.error < GRAVE
 
     def line(self) -> str:
@@ -149,7 +149,7 @@ def outcome(result: ReconstructionOutcome) -> Iterator[Finding]:
     elif not possible.low < modulus < possible.high:
         yield Finding(
             "modulus",
-            f"the modulus is {modulus:.4g} Pa; objects that can be felt so have "
+            f"the modulus is {modulus:.4g} Pa; objects that can be felt have "
             f"{possible.low / 1e3:g} kPa to {possible.high / 1e6:g} MPa",
             f"{max(possible.low / modulus, modulus / possible.high):.3g} times beyond",
             "check the units of position and force, and the tip's radius",

@@ -143,7 +143,7 @@ def refuse_grave(found: Iterable[Finding], force: bool = False) -> None:
         first, more = grave[0], f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
         raise RecordingError(
             f"{first.name}: {first.saw}{more}; {first.todo}; `palpate check REC --report PAGE` shows "
-            "where, `palpate reconstruct --force` goes on despite it"
+            "where, `palpate reconstruct --force` continues despite it"
         )
 
 

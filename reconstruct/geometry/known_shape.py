@@ -156,8 +156,8 @@ def _placed(
     notes = list(given.notes)
     if np.isfinite(found.rival_m) and found.rival_m < _ALIKE * found.rms_m:
         notes.append(
-            f"another pose of {given.name} fits nearly as well ({1e3 * found.rival_m:.2f} against "
-            f"{1e3 * found.rms_m:.2f} mm): touch what tells them apart, or give --pose given"
+            f"another pose of {given.name} fits almost as well ({1e3 * found.rival_m:.2f} against "
+            f"{1e3 * found.rms_m:.2f} mm): touch a place that separates them, or give --pose given"
         )
     if open_m > 0.05 * given.size_m:
         notes.append(

@@ -147,12 +147,15 @@ class GeometryOptions:
     )
     up: str = option("+z", "direction out of the support, in the shape's frame: +z, -x, ... or X,Y,Z")
     sink_m: float = option(
-        0.0, "cut off flat at the shape's bottom, where the object settles", unit="m", flag="--sink"
+        0.0,
+        "height that is cut off flat at the shape's bottom, where the object settles",
+        unit="m",
+        flag="--sink",
     )
     slab_m: float | None = option(
-        None, "the object is a slab of this thickness; None: it is none", unit="m", flag="--slab"
+        None, "the object is a slab of this thickness; None: no slab", unit="m", flag="--slab"
     )
-    half_space: bool = option(False, "the object is deep and wide beside every contact")
+    half_space: bool = option(False, "the object is deep and wide compared with every contact")
 
     def __post_init__(self) -> None:
         """Raises OptionError for two geometries at once, or a thickness that is not positive."""

@@ -116,9 +116,7 @@ Redraw = Callable[[float], tuple[np.ndarray, np.ndarray]]
 class SurfaceOptions:
     """Which surface, and how finely it is drawn."""
 
-    surface: str = option(
-        "auto", "shape of the object; auto weighs all by held-out touches", choices=SURFACES
-    )
+    surface: str = option("auto", "shape of the object; auto chooses by held-out touches", choices=SURFACES)
     surface_spacing_m: float = option(
         0.003, "edge length of the surface's triangles", unit="m", flag="--surface-spacing"
     )
@@ -246,11 +244,11 @@ def _found(
             support_point=evidence.origin,
             support_normal=evidence.axes[2],
             method=options.surface,
-            reason="asked for",
+            reason="chosen in the options",
             bracket_m3=volume_bounds(evidence),
         )
     if options.surface == "implicit":
-        return _implicit(evidence, options, "asked for")
+        return _implicit(evidence, options, "chosen in the options")
     try:
         tried = try_shapes(evidence, options.surface, progress)
     except HiddenOutlineError:
@@ -280,7 +278,7 @@ def _found(
         support_point=evidence.origin,
         support_normal=evidence.axes[2],
         method=best.name,
-        reason="asked for" if options.surface != "auto" else reason(best, tried),
+        reason="chosen in the options" if options.surface != "auto" else reason(best, tried),
         parameters={p.label: p.value for p in best.shape.parameters},
         held_out_m={e.name: held_out_error(e) for e in sorted(tried, key=score)},
         redraw=redraw,

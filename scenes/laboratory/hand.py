@@ -24,8 +24,8 @@ class HandOptions:
     pause_s: float = option(0.45, "mean pause in free air", unit="s")
     lean_m: float = option(0.35e-3, "mean lean into the object's foot while tracing", unit="m")
     trace_speed_m_per_s: float = option(0.035, "tracing speed", unit="m/s")
-    trace_rounds: float = option(1.0, "rounds of the foot, beside a small overlap")
-    trace_breaks: int = option(0, "how often the tracing is broken off and taken up again")
+    trace_rounds: float = option(1.0, "rounds of the foot, plus a small overlap")
+    trace_breaks: int = option(0, "how often the tracing is interrupted and continued")
     reach_pace: float = option(1.0, "how brisk the way through the air is; 1: 0.12 to 0.22 m/s")
 
 

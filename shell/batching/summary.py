@@ -60,7 +60,7 @@ class BatchEntry:
 
     @property
     def doubt(self) -> str:
-        """Why its model is not to be believed; '' where nothing speaks against it."""
+        """Why its model is not reliable; '' where nothing speaks against it."""
         return str(self.values.get("reconstruct", {}).get("doubt", ""))
 
 
@@ -113,7 +113,7 @@ class Batch(Result):
 
     @property
     def doubtful(self) -> list[Row]:
-        """Those whose model is not to be believed; `reason` says why."""
+        """Those whose model is not reliable; `reason` says why."""
         return [entry.row for entry in self.entries if entry.doubt]
 
     @property
@@ -140,7 +140,7 @@ def entry_of(name: str, outcomes: Mapping[str, Outcome], bad: str | None, steps:
     made = values.get("reconstruct", {})
     low, high = made.get("young_modulus_ci95_pa") or (None, None)
     reasons = [f"{o.task.stage}: {o.reason}" for o in failed]
-    reasons += [f"not to be believed: {made['doubt']}"] if made.get("doubt") else []
+    reasons += [f"not reliable: {made['doubt']}"] if made.get("doubt") else []
     verdict = values.get("diagnose", {})
     row = Row(
         recording=name,

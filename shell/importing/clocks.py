@@ -100,7 +100,7 @@ def _clock_of(table: Table, columns: dict[str, Column], said: Said) -> Column | 
     alone = time_of(table, said)
     if alone is None:
         raise RecordingError(
-            f"'{table.name}' has no column of time: its rows cannot be put beside the others'"
+            f"'{table.name}' has no column of time: its rows cannot be matched with the others'"
         )
     return alone
 
@@ -143,7 +143,7 @@ def _offset(place: Stream, push: Stream, said: Said, notes: list[str]) -> float:
     """s to add to the force's clock: what was said; 0 where the clocks overlap; else by cross-correlation."""
     assert place.t is not None and push.t is not None
     if isinstance(said.offset_s, int | float) and np.isfinite(said.offset_s):
-        notes.append(f"force's clock moved by {said.offset_s:g} s, as said")
+        notes.append(f"force's clock moved by {said.offset_s:g} s, as stated")
         return float(said.offset_s)
     if said.offset_s not in (None, "auto"):
         raise RecordingError(f"offset_s is {said.offset_s!r}; allowed are seconds or auto")

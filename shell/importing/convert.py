@@ -64,7 +64,7 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
         read_hz, noise_n = slower_readings(streams["force"], rate, notes)
     else:
         notes.append(
-            "no column of time: quasi-static points, which tell no rates and no delay (else give --rate)"
+            "no column of time: quasi-static points, which show no rates and no delay (else give --rate)"
         )
         t, rate = np.arange(rows.pop()) / POINTS_HZ, POINTS_HZ
         position, force = streams["position"].values, streams["force"].values
@@ -122,7 +122,7 @@ def _doubted(assumed: Mapping[str, Column]) -> None:
     if "t" in assumed and _size("time", np.asarray(assumed["t"].values)) > COLUMN["time"].high:
         step = _size("time", np.asarray(assumed["t"].values))
         raise Unclear(
-            f"a row comes every {step:.3g}, and nobody said whether ms or s", "units", ("time=ms", "time=s")
+            f"the time step is {step:.3g}, and its unit is not given: ms or s", "units", ("time=ms", "time=s")
         )
     held = [np.asarray(assumed[role].values) for role in ("x", "y", "z") if role in assumed]
     width_m = max((_size("position", values) for values in held), default=0.0)
@@ -135,7 +135,7 @@ def _doubted(assumed: Mapping[str, Column]) -> None:
     reading = best(scores)
     if reading.value == (1,) or not reading.sure:
         raise Unclear(
-            f"the path is {width_m:.3g} wide, and nobody said whether in m or mm",
+            f"the path is {width_m:.3g} wide, and its unit is not given: m or mm",
             "units",
             ("position=mm", "position=m"),
         )

@@ -61,7 +61,8 @@ def signs_of(
 def unclear_signs(raw: RawCurves, signs: BestReading) -> RecordingError:
     z, fz = raw.columns["z"].name, raw.columns["fz"].name
     return Unclear(
-        f"'{raw.path}': whether '{fz}' is positive or negative in compression cannot be told from how it "
+        f"'{raw.path}': whether '{fz}' is positive or negative in compression cannot be determined from "
+        f"how it "
         f"goes with '{z}' ({signs.words}; if these are the wrong columns, --column depth=NAME and "
         "--column load=NAME name them)",
         "compression",
@@ -119,7 +120,7 @@ def _likely(
     if not reading.sure:
         other = unit if unit != units[0] else units[1]
         raise Unclear(
-            f"'{raw.path}': the unit of '{name}' is said nowhere, and two are likely ({reading.words})",
+            f"'{raw.path}': the unit of '{name}' is not given, and two are likely ({reading.words})",
             "units",
             (f"{kind}={other}", f"{kind}={units[0]}"),
         )

@@ -61,7 +61,8 @@ def one_axis(
     signs = best({key: score for key, score in scores.items() if z.guessed or key[0] > 0})
     if not signs.sure:
         raise Unclear(
-            f"whether the force is that on the tool or on the object cannot be told from how it goes with "
+            f"whether the force is that on the tool or on the object cannot be determined from how it "
+            f"changes with "
             f"'{z.name}' ({signs.words})",
             "force_on",
             ("tool", "object"),
@@ -85,11 +86,12 @@ def is_on_tool(position: np.ndarray, force: np.ndarray, said: Said, notes: list[
                 f"sign wrong, or is it --force-on {other}?"
             )
         turned = "" if said.force_on == "tool" else ": turned round"
-        notes.append(f"the force is that on the {said.force_on}, as said{turned}")
+        notes.append(f"the force is that on the {said.force_on}, as stated{turned}")
         return said.force_on == "tool", MOST_ODDS
     if not sense.sure:
         raise Unclear(
-            f"whether the force is that on the tool or on the object cannot be told from {len(force)} rows "
+            f"whether the force is that on the tool or on the object cannot be determined from "
+            f"{len(force)} rows "
             f"({sense.words})",
             "force_on",
             ("tool", "object"),

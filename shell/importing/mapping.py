@@ -95,7 +95,7 @@ class Said:
                 raise RecordingError(f"'{role}' is no column of a recording; allowed are {', '.join(ROLES)}")
         for kind, unit in self.units.items():
             if kind not in SI:
-                raise RecordingError(f"units of '{kind}' are not asked for; allowed are {', '.join(SI)}")
+                raise RecordingError(f"units of '{kind}' are not used; allowed are {', '.join(SI)}")
             if plain(unit) not in SI[kind]:
                 raise RecordingError(f"'{unit}' is no unit of {kind}; allowed are {', '.join(SI[kind])}")
         for name, key in _NUMBERS.items():
@@ -200,7 +200,8 @@ def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
         missing = [role for role in roles if role not in found]
         if missing:
             raise RecordingError(
-                f"which columns are {kind} ({', '.join(missing)}) cannot be told from their names; say it "
+                f"which columns are {kind} ({', '.join(missing)}) cannot be determined from their names; "
+                f"give it "
                 f"with --column {missing[0]}=NAME (or '#3', '=0'): there are {_listed(tables)}"
             )
     if any(q in found for q in ROLES[7:]) and not all(q in found for q in ROLES[7:]):

@@ -228,7 +228,9 @@ class Operation:
         lines = [inspect.getdoc(self.function) or "", ""]
         lines += [each.words for each in self.listed()]
         if self.has_progress:
-            lines.append("progress: False for none; or a function of (stage, share done) that is told of it")
+            lines.append(
+                "progress: False for none; or a function of (stage, share done) that is called with it"
+            )
         return "\n".join(lines)
 
     def listed(self) -> list[Option]:

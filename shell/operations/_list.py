@@ -20,33 +20,35 @@ class Entry(NamedTuple):
 
 
 OPERATIONS = {
-    "demo": Entry("the main job on the embedded example; prints the report's path"),
-    "check": Entry("what may be wrong with a recording, before it is believed", "check"),
-    "reconstruct": Entry("a recording becomes a model", "reconstruct"),
-    "model": Entry("a MODEL from a surface's file and a modulus", "model_of"),
+    "demo": Entry("run the main steps on the embedded example; prints the report's path"),
+    "check": Entry("check a recording before a model is made of it", "check"),
+    "reconstruct": Entry("make a finite element model from a recording", "reconstruct"),
+    "model": Entry("make a model from a surface file and a Young's modulus", "model_of"),
     "open": Entry(
-        "whatever it is: understood, checked, reconstructed or measured", "open", "palpate.operations.open_"
+        "recognise a file, check it, and make a model or material of it", "open", "palpate.operations.open_"
     ),
     "import": Entry(
-        "other programs' files become a recording", "import_table read_table", "palpate.operations.import_"
+        "convert other programs' files to a recording",
+        "import_table read_table",
+        "palpate.operations.import_",
     ),
-    "export": Entry("a MODEL as a page to be pressed, for MuJoCo, SOFA, Abaqus, Gmsh, or STL", "export"),
-    "material": Entry("the material of a specimen from a machine's curves", "material"),
-    "replay": Entry("a recorded tip path through a renderer, headless", "replay"),
-    "press": Entry("one scripted press on a model, headless", "press"),
-    "compare": Entry("finite elements against spring-damper models; or before and after", "compare changes"),
-    "diagnose": Entry("what is wrong with a simulation: where, which effect, how far it shrinks", "diagnose"),
-    "calibrate": Entry("the instrument told from presses on something known", "calibrate"),
+    "export": Entry("write a model as a page, or for MuJoCo, SOFA, Abaqus, Gmsh and others", "export"),
+    "material": Entry("fit a material to the force curves of a testing machine", "material"),
+    "replay": Entry("run a recorded tip path through a renderer, headless", "replay"),
+    "press": Entry("run one scripted press on a model, headless", "press"),
+    "compare": Entry("compare FEM with spring-damper models, or two recordings", "compare changes"),
+    "diagnose": Entry("find which effect a simulation leaves out, where, and how large it is", "diagnose"),
+    "calibrate": Entry("calibrate the instrument by presses on a known object", "calibrate"),
     "touch": Entry("feel a model or scene at 1 kHz"),
-    "devices": Entry("which devices are there, and for the others why not"),
-    "explore": Entry("where to touch next and why, and when to stop"),
-    "simulate": Entry("the virtual laboratory: a person's exploration of a phantom", "simulate"),
-    "bench": Entry("benchmarks: medians, spreads and ratios"),
-    "batch": Entry("many recordings at once", "batch"),
-    "completion": Entry("what lets a shell complete all this: bash, zsh or fish"),
+    "devices": Entry("list the devices, and why some are not available"),
+    "explore": Entry("suggest where to touch next, why, and when to stop"),
+    "simulate": Entry("simulate a person's exploration of a phantom (the virtual laboratory)", "simulate"),
+    "bench": Entry("run a benchmark: medians, spreads and ratios"),
+    "batch": Entry("reconstruct, compare and diagnose many recordings", "batch"),
+    "completion": Entry("print a completion script for bash, zsh or fish"),
     "load": Entry("the model of a folder or scene", "load", command=False),
     "read_recording": Entry("a recording's file or arrays", "read_recording recording", command=False),
-    "renderer": Entry("what answers a tip at 1 kHz", "renderer", command=False),
+    "renderer": Entry("a renderer: the force on a tip at 1 kHz", "renderer", command=False),
 }
 
 

@@ -40,10 +40,11 @@ RecordingArgument = Annotated[
 ]
 """In Python also what `read_recording` or `simulate` returned."""
 Seed = Annotated[int, option("seed of every random choice", low=0, high=2**63 - 1, parse=natural)]
-Renders = Annotated[str, option("what answers", choices=(*names(), *simulator_names()))]
+Renders = Annotated[str, option("which renderer computes the force", choices=(*names(), *simulator_names()))]
 """A renderer: ours, or another simulator."""
 Units = Annotated[
-    "Mapping[str, str] | None", option("kinds: position, force, time", metavar="KIND=UNIT,...", parse=_split)
+    "Mapping[str, str] | None",
+    option("units of the columns; kinds: position, force, time", metavar="KIND=UNIT,...", parse=_split),
 ]
 """In Python {kind: unit}."""
 
@@ -70,7 +71,7 @@ def save_option(words: str, metavar: str, writes: Any, *, needed: bool = False) 
 
 def columns_option(roles: str, **more: Any) -> Mapping[str, Any]:
     """--column ROLE=NAME, repeatable; in Python {role: name}."""
-    words = f"of which role is which column (repeatable): {roles}"
+    words = f"which column has which role (repeatable): {roles}"
     return option(words, flag="--column", metavar="ROLE=NAME", count="repeat", **more)
 
 
@@ -86,9 +87,11 @@ class MeshFileOptions:
     poisson_ratio: float | None = field(
         default=None, metadata=option("Poisson's ratio; None: 0.49", flag="--nu")
     )
-    unit: str = field(default="m", metadata=option("of the file's lengths", choices=tuple(UNITS)))
-    up: str = field(default="+z", metadata=option("out of the support: +z, -x, ... or X,Y,Z", metavar="AXIS"))
-    sink_m: float = field(default=0.0, metadata=option("cut off flat at the bottom", unit="m"))
+    unit: str = field(default="m", metadata=option("unit of the file's lengths", choices=tuple(UNITS)))
+    up: str = field(
+        default="+z", metadata=option("direction out of the support: +z, -x, ... or X,Y,Z", metavar="AXIS")
+    )
+    sink_m: float = field(default=0.0, metadata=option("height that is cut off flat at the bottom", unit="m"))
 
 
 _FLAGS = {"young_modulus_pa": "modulus", "poisson_ratio": "nu", "sink_m": "sink", "columns": "column"}

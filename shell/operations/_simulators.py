@@ -27,13 +27,15 @@ if TYPE_CHECKING:
 SettingsOfSimulator = Annotated[
     str,
     option(
-        "of --renderer: as its own documentation says, or as good as it gets", choices=SETTINGS, advanced=True
+        "settings of --renderer: as its documentation says, or the most accurate",
+        choices=SETTINGS,
+        advanced=True,
     ),
 ]
 NumbersOfSimulator = Annotated[
     str,
     option(
-        "numbers of these settings to change: KEY=VALUE, comma separated",
+        "settings of --renderer to change: KEY=VALUE, comma separated",
         metavar="KEY=VALUE,...",
         advanced=True,
     ),
@@ -45,11 +47,11 @@ def simulator_option(words: str) -> Mapping[str, Any]:
     return option(words, choices=simulator_names())
 
 
-TOLD_FROM, LONG_S = 0.01, 60.0
-"""Of a run, from which its whole time is told; s, of a long one."""
+SHOWN_FROM, LONG_S = 0.01, 60.0
+"""Share of a run from which on its whole time is estimated; s, of a long run."""
 
 
-def told(whole_s: float, presses: int) -> str:
+def time_words(whole_s: float, presses: int) -> str:
     """What is said of a run that takes so long over so many presses."""
     if whole_s < LONG_S or presses <= LEAST_PRESSES:
         return f"about {max(whole_s / 60, 0.1):.2g} min in all"
@@ -114,13 +116,13 @@ def run_along(
 
     begun, estimate = time.monotonic(), ""
 
-    def tell(words: str, share: float) -> None:
+    def show_progress(words: str, share: float) -> None:
         nonlocal estimate
-        if not estimate and share > TOLD_FROM:
-            estimate = ", " + told((time.monotonic() - begun) / share, int(asked.sum()))
+        if not estimate and share > SHOWN_FROM:
+            estimate = ", " + time_words((time.monotonic() - begun) / share, int(asked.sum()))
         progress(f"{made.name}, {said}: {words}{estimate}", share)
 
-    force = replay_touches(made, recording, presses, asked, tell, failed)
+    force = replay_touches(made, recording, presses, asked, show_progress, failed)
     without = f"{len(errors)} of {asked.sum()} presses ended without an answer and are left out"
     notes = (f"{said}: {without}: {errors[0]}",) if errors else ()
     return Ran(force, chosen, made.adapter, said, notes)

@@ -54,11 +54,12 @@ class HelpWords(argparse.RawDescriptionHelpFormatter):
 
 class OneLineParser(argparse.ArgumentParser):
     """Wrong words are an OptionError, which the command line prints in one line, with what was probably
-    meant; help is `HelpWords`, and shows what most people use; `--help-all` shows the rest too."""
+    meant; help is `HelpWords`, and shows what most people use; `--help-all` shows every option."""
 
     def __init__(self, **keywords: Any) -> None:
         super().__init__(**{"formatter_class": HelpWords, "add_help": False, **keywords})
-        self.add_argument("-h", "--help", action="help", help="show this, and leave")
+        self.add_argument("-h", "--help", action="help", help="show this help and exit")
+        self.add_argument("--help-all", action=_AllHelp, help="show every option and exit")
 
     def error(self, message: str) -> NoReturn:
         """Raise it."""
@@ -73,7 +74,7 @@ class OneLineParser(argparse.ArgumentParser):
                 flag = word.partition("=")[0]
                 if word.startswith("--") and not any(each.startswith(flag) for each in flags):
                     like = near(flag, flags)
-                    self.error(f"'{flag}' is no option" + (f"; did you mean {like[0]}?" if like else ""))
+                    self.error(f"'{flag}' is not an option" + (f"; did you mean {like[0]}?" if like else ""))
         return super().parse_args(words, namespace)
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
@@ -86,7 +87,7 @@ class OneLineParser(argparse.ArgumentParser):
         return [action for action in self._actions if getattr(action, "advanced", False)]
 
     def format_help(self) -> str:
-        """What most people use, and how many options there are beside it."""
+        """What most people use, and how many more options there are."""
         advanced = {action: action.help for action in self.advanced()}
         if not advanced:
             return super().format_help()
@@ -125,14 +126,12 @@ def add_operation(parser: argparse.ArgumentParser, operation: Operation) -> None
         for field in declared(kind):
             if operation.fields[field.name] is field:
                 _add(group, field, operation.is_common(field))
-    if any(getattr(action, "advanced", False) for action in parser._actions):
-        parser.add_argument("--help-all", action=_AllHelp, help="show every option, and leave")
     if operation.has_json:
         action = parser.add_argument(
             "--json",
             metavar="PATH",
             default=argparse.SUPPRESS,
-            help="write the result as JSON; '-' for standard output alone",
+            help="write the result as JSON; '-' writes only JSON to standard output",
         )
         action.on_command_line = OnCommandLine(writes=JSON)  # type: ignore[attr-defined]
 

@@ -3,7 +3,7 @@
 SOURCE is a folder (it and all below it are searched), a pattern, or a recording. OUT gets a folder a
 recording with its MODEL, JSON and reports, summary.csv (moduli in Pa, gaps in N rms), summary.parquet where
 pyarrow is installed, and index.html. What is finished is recognised by the recording's bytes, options and
-version: run the same command again to go on, or after recordings joined or changed.
+version: run the same command again to go on, or after recordings were added or changed.
 """
 
 from __future__ import annotations
@@ -47,15 +47,16 @@ def batch(
     ] = None,
     reports: Annotated[bool, option("an HTML page of every step of every recording")] = True,
     workers: Annotated[
-        int | None, option("processes of one thread each on this machine; None: one a core")
+        int | None, option("processes of one thread each on this machine; None: one per core")
     ] = None,
     memory_gb: Annotated[
-        float | None, option("what they may take together; None: 90 % of what is free", unit="GB")
+        float | None, option("memory of all processes together; None: 90 % of what is free", unit="GB")
     ] = None,
     scheduler: Annotated[
-        str | None, option("of a Dask cluster, such as tcp://HOST:8786, in their place", metavar="ADDRESS")
+        str | None,
+        option("address of a Dask cluster that is used instead, such as tcp://HOST:8786", metavar="ADDRESS"),
     ] = None,
-    force: Annotated[bool, option("do what is finished again")] = False,
+    force: Annotated[bool, option("repeat what is finished")] = False,
     seed: Seed = 0,
     call: Call,
 ) -> Batch:
@@ -85,7 +86,7 @@ def batch(
 
 
 def _exit_code(result: Batch) -> int:
-    """2 where not one recording came through, 1 where a model is not to be believed."""
+    """2 where not one recording came through, 1 where a model is not reliable."""
     if result.failed:
         words = (
             f"{len(result.failed)} of {len(result)} recordings failed: see {result.folder / 'summary.csv'}"

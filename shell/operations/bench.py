@@ -1,6 +1,6 @@
 """Benchmarks: medians, spreads, and ratios against a peer or limit in the same run.
 
-They lie in the folder `benchmarks` of a clone of the project and are found from inside of that clone.
+They are in the folder `benchmarks` of a clone of the project: run the command inside the clone.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def clone() -> Path:
         if (folder / "benchmarks" / "__init__.py").is_file() and (folder / "shell" / "cli.py").is_file():
             return folder
     raise OptionError(
-        f"benchmarks come with a clone of the project, not with what is installed: '{here}' lies in none; "
-        "change into the clone and run it there"
+        f"benchmarks come with a clone of the project, not with the installed package: '{here}' lies in no "
+        "clone; change into the clone and run it there"
     )
 
 

@@ -1,8 +1,8 @@
-"""The instrument told from presses on something known: tip, tool's stiffness, sensor, bias, delay, play.
+"""Calibrate the instrument by presses on a known object: tip, tool stiffness, sensor, bias, delay, play.
 
 REC holds presses on a rigid plate (--rigid) or on an object of known Young's modulus (--modulus), whose
 geometry is traced, or given by --slab, --half-space or --shape. TOOL.toml is what recordings may name
-([tool] calibration = "TOOL.toml", beside them): every command then reads them as an ideal instrument had.
+([tool] calibration = "TOOL.toml", in the same folder): every command then corrects them for the instrument.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ def calibrate(
     modulus_pa: Annotated[
         float | None,
         option(
-            "they are on an object of this Young's modulus, traced, or of a geometry that is given", unit="Pa"
+            "the presses are on an object of this Young's modulus, traced or of a given geometry", unit="Pa"
         ),
     ] = None,
-    poisson_ratio: Annotated[float | None, option("of the object; None: 0.49")] = None,
+    poisson_ratio: Annotated[float | None, option("Poisson's ratio of the object; None: 0.49")] = None,
     trust: Annotated[
         str,
         option(
-            "right where a common factor is left: the tip's radius or the sensor's gain",
+            "which is taken as right where a common factor stays open: the tip's radius or the sensor's gain",
             choices=("tip", "gain"),
         ),
     ] = "tip",
@@ -64,13 +64,11 @@ def calibrate(
     from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
     if rigid == (modulus_pa is not None):
-        raise OptionError(
-            "say on what it was pressed: rigid (--rigid), or modulus_pa (--modulus PA), one of them"
-        )
+        raise OptionError("give what was pressed: either rigid (--rigid) or modulus_pa (--modulus PA)")
     if modulus_pa is not None and not modulus_pa > 0:
         raise OptionError(f"modulus_pa is {modulus_pa}; it must be greater than 0 Pa")
     measured = read_recording(recording)
-    with call.progress("calibrate") as tell:
+    with call.progress("calibrate") as show_progress:
         if modulus_pa is None:
             found = explore(measured, boundary=nowhere(measured), unbroken=True)
             result = calibrate_on_plate(found)
@@ -79,12 +77,12 @@ def calibrate(
                 measured,
                 poisson_ratio=poisson_ratio,
                 seed=seed,
-                progress=lambda s, x: tell(s, 0.3 * x),
+                progress=lambda s, x: show_progress(s, 0.3 * x),
                 **geometry,
             )
             result = calibrate_on_object(
                 measured, made.model, modulus_pa, trust=trust, seed=seed,
-                progress=lambda s, x: tell(s, 0.3 + 0.7 * x),
+                progress=lambda s, x: show_progress(s, 0.3 + 0.7 * x),
             )  # fmt: skip
     if save is None:
         call.then("next: keep it for recordings: --save TOOL.toml")

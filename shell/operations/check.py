@@ -1,7 +1,8 @@
-"""What may be wrong with a recording, before it is believed: units, axes, channels, clock, base, presses.
+"""Check a recording before a model is made of it: units, axes, channels, clock, base, presses.
 
-REC is a recording's .csv, .csv.gz or .toml. A grave finding makes its modulus worthless, and `palpate
-reconstruct` refuses it without --force; others widen the modulus's interval. Exit code 1 where one is grave.
+REC is a recording's .csv, .csv.gz or .toml. With a grave finding the modulus would be wrong:
+`palpate reconstruct` refuses the recording without --force. Other findings widen the interval of the
+modulus. Exit code 1 if a finding is grave.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ def check(
     from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
 
     measured = read_recording(recording)
-    with call.progress("check") as tell:
+    with call.progress("check") as show_progress:
         findings, seen = looked_at(measured)
         if full and not any(f.grave for f in findings):
-            findings = reconstruct_fully(measured, ReconstructOptions(force=True), tell).findings
+            findings = reconstruct_fully(measured, ReconstructOptions(force=True), show_progress).findings
     result = Checkup(measured, findings, seen, full)
     call.then_report(result, report)
     call.exit_code = int(bool(result.grave))

@@ -1,6 +1,6 @@
-"""Which model predicts a touch that it has not seen: finite elements (FEM), or springs and dampers that are
-interpolated between presses (1D). Or, with REC2, two recordings of one object (before and after, two tools):
-their moduli, the difference, what explains it.
+"""Which model predicts a held-out touch better: finite elements (FEM), or springs and dampers that are
+interpolated between presses (1D). With REC2, compare two recordings of one object (before and after, two
+tools): their moduli, the difference, what explains it.
 
 Single places are left out of the fits, then whole regions. Of --model only the geometry is used; all else is
 fitted anew each time. Errors are root mean squares of the force vector in contact, N; bias is the share by
@@ -46,7 +46,7 @@ def compare(
     ] = None,
     *,
     renderer: Annotated[
-        str | None, simulator_option("another simulator beside them, run along the path")
+        str | None, simulator_option("another simulator to compare with, run along the path")
     ] = None,
     simulator_settings: SettingsOfSimulator = DOCUMENTED,
     simulator_set: NumbersOfSimulator = "",
@@ -81,22 +81,22 @@ def compare(
     result: Any
     if other is not None:
         if renderer is not None:
-            raise OptionError("--renderer goes with one recording: it is set beside the models of it")
+            raise OptionError("--renderer needs one recording: it is compared with its models")
         if model:
-            raise OptionError("--model goes with one recording: two are reconstructed each by itself")
+            raise OptionError("--model needs one recording: with two, each is reconstructed by itself")
         result = changes(recording, other, diagnosed=diagnosed, seed=seed, progress=call.wanted)
         call.then_report(result, report)
         return result
     source, measured = given_model(model, file), read_recording(recording)
-    with call.progress("compare") as tell:
-        plain = None if source is None else load(source, progress=tell)
-        simulated, rest = None, tell
+    with call.progress("compare") as show_progress:
+        plain = None if source is None else load(source, progress=show_progress)
+        simulated, rest = None, show_progress
         if renderer is not None:
             if plain is None:
-                plain = reconstruct(measured, seed=seed, progress=part(tell, 0.0, 0.3)).model
+                plain = reconstruct(measured, seed=seed, progress=part(show_progress, 0.0, 0.3)).model
             made = simulator(renderer, simulator_settings, simulator_set, plain)
-            ran = run_along(made, measured, part(tell, 0.3, 0.7))
-            simulated, rest = {renderer: Along(measured.t, ran.force)}, part(tell, 0.7, 1.0)
+            ran = run_along(made, measured, part(show_progress, 0.3, 0.7))
+            simulated, rest = {renderer: Along(measured.t, ran.force)}, part(show_progress, 0.7, 1.0)
         result = compared(measured, plain, options, simulated=simulated, seed=seed, progress=rest)
     call.then_report(result, report)
     return result
@@ -108,7 +108,7 @@ def changes(
     after: Annotated[RecordingLike, option("another of the same object")],
     *,
     diagnosed: Annotated[bool, option("diagnose each too")] = True,
-    fast: Annotated[bool, option("by fewer effects")] = True,
+    fast: Annotated[bool, option("try fewer effects")] = True,
     seed: Seed = 0,
     geometry: Given[GeometryOptions],
     call: Call,
@@ -126,11 +126,11 @@ def changes(
 
     sides = []
     both = read_recording(before), read_recording(after)  # a wrong name is refused at once
-    with call.progress("changes") as tell:
+    with call.progress("changes") as show_progress:
         for k, measured in enumerate(both):
 
             def step(words: str, share: float, k: int = k) -> None:
-                tell(words, 0.5 * k + 0.5 * share)
+                show_progress(words, 0.5 * k + 0.5 * share)
 
             made = reconstruct(measured, seed=seed, progress=lambda s, x: step(s, 0.4 * x), **geometry)
             found = None

@@ -1,4 +1,4 @@
-"""What lets a shell complete commands, options and their values.
+"""Print the script with which a shell completes commands, options and their values.
 
     eval "$(palpate completion bash)"     # in ~/.bashrc
     eval "$(palpate completion zsh)"      # in ~/.zshrc, after compinit

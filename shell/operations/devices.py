@@ -1,4 +1,4 @@
-"""List the devices: what is there and what it can do, and for the rest why not and what to do about it."""
+"""List the devices: what each can do, or why it is not available and what to do about it."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""What is wrong with a simulation: where its force leaves the measured one, which effect was left out, and
-how far the gap between them shrinks with it.
+"""Find what is wrong with a simulation: where its force differs from the measured one, which effect was left
+out, and how far the gap shrinks with that effect.
 
 REC is a recording, or the name of an embedded one. Without --model it is reconstructed first. The answer
-may be one effect, several, a set that the touches cannot tell apart, "none" (the gap is noise) or "unknown".
-Forces in N (root mean square in contact, at places that the fit had not seen), lengths in m, moduli in Pa.
+may be one effect, several, a set that the touches cannot separate, "none" (the gap is noise) or "unknown".
+Forces in N (root mean square in contact, at held-out places), lengths in m, moduli in Pa.
 With --simulated FORCES.csv (t,fx,fy,fz: s, and N on the tool, along the recorded path) it is the gap of that
 simulator, in three parts: its numerics, the parameters that it was given, and what every ideal elastic
 simulation lacks.
@@ -63,7 +63,8 @@ def diagnose(
     model: Annotated[
         ModelLike | None,
         option(
-            "of this recording or of another of the same object; without it the recording is reconstructed",
+            "a model of this object, from this recording or another; without it the recording is "
+            "reconstructed",
             metavar="MODEL",
             reads=True,
         ),
@@ -87,7 +88,7 @@ def diagnose(
     mended: Annotated[
         str | None,
         option(
-            "run --renderer once more as the advice says, and measure the gap that is left: best, or numbers "
+            "run --renderer once more as the advice says, and measure the remaining gap: best, or numbers "
             "of its settings (KEY=VALUE, comma separated)",
             metavar="SETTINGS",
         ),
@@ -95,8 +96,8 @@ def diagnose(
     presses: Annotated[
         int | None,
         option(
-            "run --renderer over so many of the recording's presses, spread over its places; default: 12 "
-            "of an expensive simulator, all of the others",
+            "run --renderer over this many of the recording's presses, spread over its places; default: 12 "
+            "for a slow simulator, else all",
             low=LEAST_PRESSES,
         ),
     ] = None,
@@ -158,12 +159,12 @@ def diagnose(
     if corrected and not str(corrected).endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{corrected}' must end in .csv or .csv.gz")
     source, measured = given_model(model, file), read_recording(recording)
-    with call.progress("diagnose") as tell:
+    with call.progress("diagnose") as show_progress:
         if source is None:
-            made = reconstruct(measured, progress=lambda s, x: tell(f"model: {s}", 0.3 * x)).model
+            made = reconstruct(measured, progress=lambda s, x: show_progress(f"model: {s}", 0.3 * x)).model
             begun = 0.3
         else:
-            plain = load(source, progress=tell)
+            plain = load(source, progress=show_progress)
             made, begun = plain.replaced(presses=presses_on(measured, plain)), 0.0
         if options.exact:
             places = deepest_of_sites(made.presses.site, made.presses.deepest)
@@ -171,7 +172,7 @@ def diagnose(
         rules: dict[str, Any] = {"nuisance": nuisance, "attribution": attribution}
 
         def rest(stage: str, share: float) -> None:
-            tell(stage, begun + (1 - begun) * share)
+            show_progress(stage, begun + (1 - begun) * share)
 
         result: Any
         if renderer is None and forces is None:
@@ -186,8 +187,8 @@ def diagnose(
                 result = diagnose_simulated(measured, made, simulation, options, rest, **rules)
             else:
                 assert renderer is not None
-                told = part(tell, begun, 1.0)
-                half = part(told, 0.0, 0.5)
+                rest_of_it = part(show_progress, begun, 1.0)
+                half = part(rest_of_it, 0.0, 0.5)
                 simulations = _simulations(
                     [simulator(renderer, *each, made) for each in runs],
                     measured,
@@ -197,10 +198,18 @@ def diagnose(
                     half,
                 )
                 first, again = simulations[0], simulations[1:]
-                result = diagnose_simulated(measured, made, first, options, part(told, 0.5, 0.9), **rules)
+                result = diagnose_simulated(
+                    measured, made, first, options, part(rest_of_it, 0.5, 0.9), **rules
+                )
                 for each in again:
                     left = diagnose_simulated(
-                        measured, made, each, options, part(told, 0.9, 1.0), reality=result.reality, **rules
+                        measured,
+                        made,
+                        each,
+                        options,
+                        part(rest_of_it, 0.9, 1.0),
+                        reality=result.reality,
+                        **rules,
                     )
                     found = Mended(each.run_as, left.gap_before_n, left.effects)
                     result = replace(result, mended=found)
@@ -250,7 +259,7 @@ def _simulations(
     presses: int | None,
     given: Any,
     of_forces: ForcesOptions,
-    tell: Progress,
+    show_progress: Progress,
 ) -> list[Asked]:
     """What each gave along the recorded path, over the same presses; and what it says of itself."""
     import numpy as np
@@ -262,7 +271,7 @@ def _simulations(
     most = presses or fewest(made)
     share = 1 / len(made)
     runs = [
-        run_along(each, measured, part(tell, k * share, (k + 1) * share), most=most)
+        run_along(each, measured, part(show_progress, k * share, (k + 1) * share), most=most)
         for k, each in enumerate(made)
     ]
     chosen = np.logical_and.reduce([ran.chosen for ran in runs])

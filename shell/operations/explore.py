@@ -2,10 +2,10 @@
 
 In the virtual laboratory (--phantom NAME) a simulated robot follows the suggestions with errors of place,
 way and depth. In the touch window (--device NAME, --scene) a ghost tip shows where and how to press. A robot
-of your own talks over standard input and output (--robot): one line of JSON a suggestion and a segment, as
-docs/howto/robot.md tells. The recording so far is written after every touch, so an exploration that was
-interrupted is whole, and --continue goes on with it. At the end `palpate reconstruct` makes a MODEL of it
-like any other.
+of your own talks over standard input and output (--robot): one line of JSON for each suggestion and each
+segment, see docs/howto/robot.md. The recording is written after every touch: an interrupted exploration is a
+valid recording, and --continue goes on with it. At the end `palpate reconstruct` makes a MODEL from it as
+from any other.
 """
 
 from __future__ import annotations
@@ -79,9 +79,9 @@ def explore(
             advanced=True,
         ),
     ] = None,
-    tip_radius_m: Annotated[float, option("of the spherical tip", unit="m")] = 0.005,
+    tip_radius_m: Annotated[float, option("radius of the spherical tip", unit="m")] = 0.005,
     rate_hz: Annotated[float, option("with --robot: samples a second", unit="Hz", advanced=True)] = 1000.0,
-    poisson_ratio: Annotated[float, option("of the object")] = 0.49,
+    poisson_ratio: Annotated[float, option("Poisson's ratio of the object")] = 0.49,
     young_modulus_pa: Annotated[
         float | None,
         option(
@@ -96,7 +96,7 @@ def explore(
 ) -> Explored:
     """Explore until a goal, the limit or the robot ends it; what was known after each touch."""
     if (phantom is not None) + robot + (device is not None) != 1:
-        raise OptionError("say who touches: one of --phantom NAME, --robot and --device NAME")
+        raise OptionError("give who touches: one of --phantom NAME, --robot and --device NAME")
     check_goals(goals)
     if not POISSON_RATIO.takes(poisson_ratio):
         raise OptionError(f"--poisson-ratio is {poisson_ratio}; it must be {POISSON_RATIO.words}")
@@ -172,20 +172,20 @@ def _by_robot(begun: Begun, output: str, rate_hz: float, tip_radius_m: float, nu
         raise OptionError("--rate and --tip-radius must be greater than 0")
     explorer = begun(Instrument(tip_radius_m, rate_hz, {"poisson_ratio": nu}), nu)
 
-    def tell(line: str) -> None:
+    def send(line: str) -> None:
         print(line, flush=True)
 
-    serve(explorer, sys.stdin, tell, lambda e: e.save(output))
+    serve(explorer, sys.stdin, send, lambda e: e.save(output))
     return explorer.explored(output)
 
 
 def _on_phantom(begun: Begun, output: str, robot: LaboratoryRobot, most: int, call: Call) -> Explored:
     explorer = begun(robot.instrument, robot.phantom.poisson_ratio)
     robot.made = sum(s.kind == "press" for s in explorer.segments)
-    with call.progress("explore") as tell:
+    with call.progress("explore") as show_progress:
         while True:
             made = explorer.state.made
-            tell(f"touch {made + 1} of at most {most}", min(made / most, 1.0))
+            show_progress(f"touch {made + 1} of at most {most}", min(made / most, 1.0))
             suggestion = explorer.suggest()
             call.out.say(_line(suggestion, explorer.state))
             if suggestion.kind == "stop":

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @operation()
 def export(
     model: Annotated[ModelLike, model_argument("folder of a model, or a scene")],
-    to: Annotated[str, option("the program", choices=tuple(FORMATS))],
+    to: Annotated[str, option("program or format to write for", choices=tuple(FORMATS))],
     path: Annotated[str | Path, option("file to write", flag="--output", short="-o", metavar="PATH")],
     *,
     at: Annotated[
@@ -39,8 +39,10 @@ def export(
             parse=vector,
         ),
     ] = None,
-    depth_m: Annotated[float | None, option("how deep; None: half the tip's radius", unit="m")] = None,
-    unit: Annotated[str, option("of an STL's lengths", metavar="UNIT")] = "m",
+    depth_m: Annotated[
+        float | None, option("depth of the press; None: half the tip's radius", unit="m")
+    ] = None,
+    unit: Annotated[str, option("unit of an STL's lengths", metavar="UNIT")] = "m",
     call: Call,
 ) -> tuple[str, ...]:
     """Write a model for another program: a minimal scene that runs there, its mesh, or a page to be pressed.
@@ -55,8 +57,8 @@ def export(
 
     plain = load(model, progress=call.wanted)
     place = None if at is None else np.asarray(at)
-    with call.progress("export") as tell:
-        notes = write(plain, to, path, at=place, depth_m=depth_m, unit=unit, progress=tell)
+    with call.progress("export") as show_progress:
+        notes = write(plain, to, path, at=place, depth_m=depth_m, unit=unit, progress=show_progress)
     call.then(f"written for {to}: {path}", *(f"  {note}" for note in notes))
     call.following = [f"next: {FORMATS[to].opened_by.replace('`', '').format(path=path)}"]
     call.figures = {"to": to, "path": path, "notes": list(notes)}

@@ -1,6 +1,6 @@
-"""Other programs' files become a recording: text, spreadsheets, NumPy, MATLAB, HDF5, Parquet, ROS, MCAP.
+"""Convert other programs' files to a recording: text, spreadsheets, NumPy, MATLAB, HDF5, Parquet, ROS, MCAP.
 
-Columns are guessed from their names, and said by --column ROLE=NAME where that fails (roles: t, x, y, z,
+Columns are guessed from their names, or given by --column ROLE=NAME where that fails (roles: t, x, y, z,
 fx, fy, fz, qw, qx, qy, qz; '#3' is the third column, '-NAME' its negative, '=0' a constant in SI,
 'TOPIC:NAME' one of several tables), or by a --mapping file. Units come from the names ('Load (uN)', 'x_mm')
 or --units position=mm,force=N,time=ms. A picture of what was understood is drawn before anything is
@@ -58,34 +58,47 @@ def import_table(
     ] = None,
     mapping: Annotated[
         str | Path | None,
-        option("all of this as a file (docs/howto/own-data.md)", metavar="TOML", reads=True),
+        option("file that gives all of this (docs/howto/own-data.md)", metavar="TOML", reads=True),
     ] = None,
     columns: Annotated[
         Mapping[str, str] | None, columns_option("t, x, y, z, fx, fy, fz, qw, qx, qy, qz")
     ] = None,
     units: Units = None,
-    tip_radius_m: Annotated[float | None, option("of the tool's spherical tip", unit="m")] = None,
+    tip_radius_m: Annotated[float | None, option("radius of the tool's spherical tip", unit="m")] = None,
     force_on: Annotated[
-        str | None, option("whose force it is; None: by what a solid does", choices=("tool", "object"))
+        str | None,
+        option(
+            "body on which the force acts; None: by the sign that a solid gives", choices=("tool", "object")
+        ),
     ] = None,
-    frame: Annotated[str | None, option("of the force; None: device", choices=("device", "tool"))] = None,
+    frame: Annotated[
+        str | None, option("frame of the force; None: device", choices=("device", "tool"))
+    ] = None,
     rotation: Annotated[Any, option("(3, 3) from the file's axes to the device frame", only="python")] = None,
     flange_to_tip_m: Annotated[
         Sequence[float] | None,
-        option("in the tool's frame, (3,)", unit="m", metavar="X,Y,Z", parse=_list, advanced=True),
+        option(
+            "from flange to tip, in the tool's frame, (3,)",
+            unit="m",
+            metavar="X,Y,Z",
+            parse=_list,
+            advanced=True,
+        ),
     ] = None,
     mass_kg: Annotated[
         float | None,
-        option("beyond the sensor; its weight is taken off", unit="kg", flag="--tool-mass", advanced=True),
+        option(
+            "mass beyond the sensor; its weight is subtracted", unit="kg", flag="--tool-mass", advanced=True
+        ),
     ] = None,
     tare_s: Annotated[
         Sequence[float] | None,
-        option("take off the mean force of this time", unit="s", metavar="START,END", parse=_tare),
+        option("subtract the mean force of this time span", unit="s", metavar="START,END", parse=_tare),
     ] = None,
     offset_s: Annotated[
         float | str | None,
         option(
-            "of the force's clock, or auto (cross-correlation)",
+            "offset of the force's clock, or auto (cross-correlation)",
             unit="s",
             metavar="NUMBER",
             parse=_offset,
@@ -95,26 +108,28 @@ def import_table(
     clock: Annotated[
         str | None,
         option(
-            "where time goes back: one clock, or blocks with their own",
+            "if time goes back: one clock, or blocks with a clock each",
             choices=("one", "blocks"),
             advanced=True,
         ),
     ] = None,
     rate_hz: Annotated[
-        float | None, option("to resample to, or of rows without a time", unit="Hz", advanced=True)
+        float | None, option("rate to resample to, or rate of rows without a time", unit="Hz", advanced=True)
     ] = None,
     thing: Annotated[
         Mapping[str, Any] | None, option("what [object] of the recording is to say", only="python")
     ] = None,
-    name: Annotated[str | None, option("of the object", only="command", advanced=True)] = None,
+    name: Annotated[str | None, option("name of the object", only="command", advanced=True)] = None,
     slab: Annotated[
-        float | None, option("the object is a slab so thick", unit="m", only="command", advanced=True)
+        float | None, option("thickness, if the object is a slab", unit="m", only="command", advanced=True)
     ] = None,
-    half_space: Annotated[bool, option("the object is deep and wide", only="command", advanced=True)] = False,
+    half_space: Annotated[
+        bool, option("the object is deep and wide compared with the contacts", only="command", advanced=True)
+    ] = False,
     picture: Annotated[
         str | None,
         option(
-            "what was understood; default: beside REC, 'none' for no picture",
+            "what was understood; default: next to REC, 'none' for no picture",
             metavar="PNG",
             writes="palpate.importing.imported:PICTURE",
             only="command",

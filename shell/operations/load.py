@@ -47,5 +47,5 @@ def load(
         source = load_scene(source)
     if not isinstance(source, Scene):
         raise OptionError(f"a {type(source).__name__} is no model: give one, a MODEL folder or a scene")
-    with call.progress("load") as tell:
-        return scene_model(source, tell)
+    with call.progress("load") as show_progress:
+        return scene_model(source, show_progress)

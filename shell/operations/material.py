@@ -1,10 +1,11 @@
-"""The material of a specimen from a machine's curves: indentation, compression, tension, relaxation.
+"""Fit a material to the curves of a testing machine: indentation, compression, tension, relaxation.
 
 FILEs are exports of bench instruments, a curve each (approach, perhaps a hold, retract): a sphere's
 indentations (Chiaro's text, or any table with time, travel and load), cylinders between platens, pulls to
-failure, relaxation curves. Columns and units are told by their names, or by --column and --units as in
-`palpate import`. The answer is a modulus, the law or effects that predict curves which were held out, beside
-1D models as floor and a regression without mechanics as ceiling, and what such a test cannot tell. SI units.
+failure, relaxation curves. Columns and units are recognised by their names, or given by --column and --units
+as in `palpate import`. The result is a modulus, and the law or effects that predict held-out curves best,
+compared with 1D models and with a regression without mechanics; and what such a test cannot determine. SI
+units.
 """
 
 from __future__ import annotations
@@ -25,10 +26,10 @@ if TYPE_CHECKING:
 
 @operation()
 def material(
-    *files: Annotated[str | Path, argument("a curve each", metavar="FILE", count="+", reads=True)],
-    kind: Annotated[str, option("of test; auto goes by the headers", choices=("auto", *KINDS))] = "auto",
+    *files: Annotated[str | Path, argument("files of one curve each", metavar="FILE", count="+", reads=True)],
+    kind: Annotated[str, option("kind of test; auto reads the headers", choices=("auto", *KINDS))] = "auto",
     tip_radius_m: Annotated[
-        float | None, option("of an indenter's sphere, where the files do not say", unit="m")
+        float | None, option("radius of the indenter's sphere, if the files do not give it", unit="m")
     ] = None,
     layer_m: Annotated[float | None, option("thickness of the sample; None: a half-space", unit="m")] = None,
     poisson_ratio: Annotated[float, option("of the material")] = 0.49,
@@ -39,21 +40,23 @@ def material(
     units: Units = None,
     travel: Annotated[
         str | None,
-        option("which way the position counts; None: by what a solid does", choices=("into", "out")),
+        option(
+            "which way the position counts; None: by the sign that a solid gives", choices=("into", "out")
+        ),
     ] = None,
     compression: Annotated[
         str | None,
         option(
-            "the load's sign as it presses; None: by what a solid does",
+            "the load's sign as it presses; None: by the sign that a solid gives",
             choices=("positive", "negative"),
             advanced=True,
         ),
     ] = None,
     clock: Annotated[
         str | None,
-        option("where time goes back: one clock, or blocks with their own", choices=("one", "blocks")),
+        option("if time goes back: one clock, or blocks with a clock each", choices=("one", "blocks")),
     ] = None,
-    fast: Annotated[bool, option("fewer effects are tried", advanced=True)] = False,
+    fast: Annotated[bool, option("try fewer effects", advanced=True)] = False,
     report: Annotated[str | None, report_option("write the answer with its curves as a page")] = None,
     seed: Seed = 0,
     call: Call,
@@ -70,7 +73,7 @@ def material(
 
     said = SaidOfCurves(named(columns, "columns"), named(units, "units"), travel, compression, clock)
     tests = read_tests(files, kind=kind, tip_radius_m=tip_radius_m, said=said)
-    with call.progress("material") as tell:
+    with call.progress("material") as show_progress:
         result = material_of(
             tests,
             files,
@@ -79,7 +82,7 @@ def material(
             specimens=specimens,
             fast=fast,
             seed=seed,
-            progress=tell,
+            progress=show_progress,
         )
     call.then_report(result, report)
     call.exit_code = 0 if result.predicts else 1

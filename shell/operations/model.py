@@ -37,7 +37,7 @@ def model_of(
     save: Annotated[
         str | Path | None, save_option("folder of the model to write", "MODEL", MODEL, needed=True)
     ] = None,
-    tip_radius_m: Annotated[float | None, option("of the tool; None: 0.005", unit="m")] = None,
+    tip_radius_m: Annotated[float | None, option("radius of the tip; None: 0.005", unit="m")] = None,
     mesh_size_m: Annotated[
         float | None, option("edge of the tetrahedra; None: 0.010 or an eighth", unit="m")
     ] = None,
@@ -64,6 +64,6 @@ def model_of(
         value = getattr(scene, name)
         if value is not None and not value > 0:
             raise OptionError(f"{name} is {value}; it must be greater than 0")
-    with call.progress("model") as tell:
-        made = model_of_mesh(shape, scene, tell)
+    with call.progress("model") as show_progress:
+        made = model_of_mesh(shape, scene, show_progress)
     return made if save is None else made.save(save)

@@ -1,9 +1,10 @@
-"""Whatever it is: says what it took the files for, brings them in, checks them, does the one sensible thing.
+"""Recognise what the files are, import and check them, and make a model or a material of them.
 
 FILEs are a recording (NAME.csv and NAME.toml), a table or bag of a robot's log, a machine's curves, a surface
-or mesh, or a MODEL. A recording becomes a model, curves become a material, a surface a MODEL; one page tells
-it. Where meaning is open (unit, sign, tip radius, one clock or many) it asks in one question on a terminal;
-elsewhere it ends in one line that names the flag. SI units. Exit code 1 where the answer does not predict.
+or mesh, or a MODEL. A recording becomes a model, curves become a material, a surface a MODEL; one page shows
+the result. Where a meaning is unclear (unit, sign, tip radius, one clock or many) it asks one question on a
+terminal; elsewhere it ends with one line that names the flag. SI units. Exit code 1 if the result does not
+predict held-out data.
 """
 
 from __future__ import annotations
@@ -41,34 +42,42 @@ def open(
     report: Annotated[
         str | None, report_option("the page; default: NAME-palpate.html here, 'none' for no page")
     ] = None,
-    tip_radius_m: Annotated[
-        float | None, option("of the tool or indenter, where no file says it", unit="m")
-    ] = None,
+    tip_radius_m: Annotated[float | None, option("radius of the tip, if no file gives it", unit="m")] = None,
     columns: Annotated[
         Mapping[str, str] | None,
         columns_option("as of import; of curves t, depth (or height), load", advanced=True),
     ] = None,
     units: Units = None,
-    force_on: Annotated[str | None, option("whose force it is", choices=("tool", "object"))] = None,
+    force_on: Annotated[
+        str | None, option("body on which the force acts", choices=("tool", "object"))
+    ] = None,
     travel: Annotated[
         str | None, option("which way a machine's position counts", choices=("into", "out"), advanced=True)
     ] = None,
     compression: Annotated[
-        str | None, option("a machine's load as it presses", choices=("positive", "negative"), advanced=True)
+        str | None,
+        option("sign of a machine's load as it presses", choices=("positive", "negative"), advanced=True),
     ] = None,
     clock: Annotated[
-        str | None, option("where time goes back", choices=("one", "blocks"), advanced=True)
+        str | None,
+        option(
+            "if time goes back: one clock, or blocks with a clock each",
+            choices=("one", "blocks"),
+            advanced=True,
+        ),
     ] = None,
-    slab_m: Annotated[float | None, option("the object is a slab so thick", unit="m", flag="--slab")] = None,
-    half_space: Annotated[bool, option("the object is deep and wide")] = False,
+    slab_m: Annotated[
+        float | None, option("thickness, if the object is a slab", unit="m", flag="--slab")
+    ] = None,
+    half_space: Annotated[bool, option("the object is deep and wide compared with the contacts")] = False,
     layer_m: Annotated[
         float | None, option("thickness of a machine's sample; None: a half-space", unit="m")
     ] = None,
     young_modulus_pa: Annotated[
-        float | None, option("of a surface's file", unit="Pa", flag="--modulus")
+        float | None, option("Young's modulus, for a surface file", unit="Pa", flag="--modulus")
     ] = None,
-    unit: Annotated[str, option("of a surface's file: m, cm, mm, um, in")] = "m",
-    fast: Annotated[bool, option("fewer effects are tried", advanced=True)] = False,
+    unit: Annotated[str, option("unit of a surface file: m, cm, mm, um, in")] = "m",
+    fast: Annotated[bool, option("try fewer effects", advanced=True)] = False,
     seed: Seed = 0,
     call: Call,
 ) -> Opened:
@@ -130,7 +139,7 @@ def _mesh(
     made = model_of(
         _only(files), modulus_pa, save=save, unit=unit, tip_radius_m=tip_radius_m, progress=progress
     )
-    notes = () if modulus_pa else ("nobody said a modulus: 20000 Pa; --modulus PA states another",)
+    notes = () if modulus_pa else ("no modulus was given: 20000 Pa is taken; --modulus PA sets another",)
     understood = {"took it for": f"the surface of an object, lengths in {unit}"}
     return Opened("mesh", _names(files), understood, result=made, notes=notes)
 
@@ -183,7 +192,7 @@ def _reconstructed(
 
 def _only(files: tuple[Any, ...]) -> Any:
     if len(files) > 1:
-        raise OptionError(f"{len(files)} files were given, and '{files[0]}' stands alone: name one")
+        raise OptionError(f"{len(files)} files were given, and '{files[0]}' is opened by itself: name one")
     return files[0]
 
 

@@ -1,9 +1,9 @@
 """One scripted press on a model, headless: t,x,y,z,depth,fx,fy,fz in s, m and N (force on the tool).
 
 The tip comes straight along --direction with its centre aimed at --at (m, device frame), goes in by --depth
-along the surface's normal after first touch, and comes out again. Beside the object it meets the support, as
-in 'palpate touch' (--no-support leaves that out). With --expect the curve is compared with a
-stored one: exit 1 where the forces differ by more than --tolerance anywhere.
+along the surface's normal after first touch, and comes out again. Next to the object it meets the support, as
+in 'palpate touch' (--no-support leaves it out). With --expect the curve is compared with a stored one: exit
+code 1 if the forces differ by more than --tolerance anywhere.
 """
 
 from __future__ import annotations
@@ -39,16 +39,20 @@ def press(
     direction: Annotated[
         Sequence[float] | None,
         option(
-            "of the motion, (3,), any length; None: straight onto the support", metavar="X,Y,Z", parse=vector
+            "direction of the motion, (3,), any length; None: straight onto the support",
+            metavar="X,Y,Z",
+            parse=vector,
         ),
     ] = None,
-    depth_m: Annotated[float, option("along the surface's normal after first touch", unit="m")] = 0.004,
-    speed_m_per_s: Annotated[float, option("of the tip", unit="m/s", flag="--speed")] = 0.01,
+    depth_m: Annotated[float, option("depth along the surface's normal after first touch", unit="m")] = 0.004,
+    speed_m_per_s: Annotated[float, option("speed of the tip", unit="m/s", flag="--speed")] = 0.01,
     *,
-    hold_s: Annotated[float, option("at depth", unit="s", advanced=True)] = 0.0,
-    approach_m: Annotated[float, option("of free air before", unit="m", advanced=True)] = 2e-3,
+    hold_s: Annotated[float, option("time at depth", unit="s", advanced=True)] = 0.0,
+    approach_m: Annotated[
+        float, option("way through free air before the touch", unit="m", advanced=True)
+    ] = 2e-3,
     rate_hz: Annotated[float, option("samples a second", unit="Hz", advanced=True)] = 1000.0,
-    tip_radius_m: Annotated[float | None, option("of the tool; None: the model's", unit="m")] = None,
+    tip_radius_m: Annotated[float | None, option("radius of the tip; None: the model's", unit="m")] = None,
     renderer: Renders = "fem",
     exact: Annotated[bool, option(EXACT)] = False,
     output: Annotated[
@@ -57,7 +61,7 @@ def press(
     expect: Annotated[
         str | None, option("a curve to compare with", metavar="CURVE.csv", reads=True, only="command")
     ] = None,
-    tolerance: Annotated[float, option("of --expect", unit="N", only="command")] = 0.02,
+    tolerance: Annotated[float, option("greatest difference from --expect", unit="N", only="command")] = 0.02,
     file: Given[MeshFileOptions],
     render: Given[RenderOptions],
     support: SupportOptions,
@@ -81,8 +85,8 @@ def press(
     if exact:
         check_renderer(renderer)
     make = touched_scene(given_model(model, file, "a"), renderer, render, support)
-    with call.progress("press") as tell:
-        scene = make(tell)
+    with call.progress("press") as show_progress:
+        scene = make(show_progress)
     places = None
     if exact:
         places = ExactPlaces(scene.renderer, tip_radius_m)

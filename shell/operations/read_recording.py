@@ -63,15 +63,18 @@ def _described(path: Path) -> bool:
 @operation(progress=False)
 def recording(
     t: Annotated[Any, option("times, (n,)", unit="s")],
-    position: Annotated[Any, option("of the tip's centre, (n, 3)", unit="m")],
+    position: Annotated[Any, option("position of the tip's centre, (n, 3)", unit="m")],
     force: Annotated[Any, option("(n, 3)", unit="N")],
     *,
     tip_radius_m: Annotated[
-        float | None, option("of the tool's spherical tip; also said as tip_radius", unit="m")
+        float | None, option("radius of the tool's spherical tip; also given as tip_radius", unit="m")
     ] = None,
     tip_radius: Annotated[float | None, option("the same", unit="m")] = None,
     force_on: Annotated[
-        str | None, option("whose force it is; None: by what a solid does", choices=("tool", "object"))
+        str | None,
+        option(
+            "body on which the force acts; None: by the sign that a solid gives", choices=("tool", "object")
+        ),
     ] = None,
     units: Annotated[Any, option("of the arrays, where they are in others: {'position': 'mm'}")] = None,
     thing: Annotated[Any, option("what [object] of a recording says: {'slab_m': 0.03}")] = None,

@@ -1,9 +1,9 @@
-"""A recording becomes a model: contacts, base, surface, tetrahedra, modulus, 1D models of every press.
+"""Make a model from a recording: contacts, base, surface, tetrahedra, modulus, 1D models of every press.
 
 REC is a recording's .csv, .csv.gz or .toml. MODEL is a folder: model.toml, mesh.vtu (ParaView opens it),
-palpations.csv. Lengths in m, forces in N, moduli in Pa. Exit code 1, with everything written, where the
-answer is not to be believed: a known shape that the first touches do not lie on, or places that were held
-out and are predicted worse than by a constant push.
+palpations.csv. Lengths in m, forces in N, moduli in Pa. Exit code 1, with all files written, if the
+model is not reliable: the first touches do not lie on the known shape, or the model predicts held-out places
+worse than a constant force does.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def reconstruct(
     beside: Annotated[
         Sequence[str],
         option(
-            "with --report: another model to draw beside (repeatable)",
+            "with --report: another model to draw next to this one (repeatable)",
             metavar="MODEL",
             reads=True,
             count="repeat",
@@ -53,7 +53,7 @@ def reconstruct(
     """A recording becomes a model: contacts, base, surface, tetrahedra, Young's modulus, 1D models.
 
     What is computed for the model later is kept in the folder `save` too. The result goes wherever a model
-    goes; its `doubt` says why it is not to be believed, '' where nothing speaks against it. Lengths m, forces
+    goes; its `doubt` says why it is not reliable, '' where nothing speaks against it. Lengths m, forces
     N. Raises OptionError, ContactError, SurfaceError or MeshError.
     """
     from palpate.mechanics.model.files import read_model
@@ -62,8 +62,8 @@ def reconstruct(
 
     for name in beside:
         read_model(name)  # before the work
-    with call.progress("reconstruct") as tell:
-        made = reconstruct_fully(read_recording(recording), options, tell, call.out.say)
+    with call.progress("reconstruct") as show_progress:
+        made = reconstruct_fully(read_recording(recording), options, show_progress, call.out.say)
     if save is not None:
         made = dataclasses.replace(made, model=made.model.save(save))
         felt_surface(made.model, made.sites)
@@ -81,6 +81,6 @@ def _reported(made: Reconstruction, page: str, beside: Sequence[str]) -> list[st
     from palpate.mechanics.model.files import read_model
 
     models = {Path(name).name: read_model(name) for name in beside}
-    with progress_bar("report") as tell:
-        load_or_condense(made.model, tell)  # the report's object can be pressed
+    with progress_bar("report") as show_progress:
+        load_or_condense(made.model, show_progress)  # the report's object can be pressed
     return [report_words(made.report(page, models))]

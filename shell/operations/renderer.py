@@ -1,4 +1,4 @@
-"""Renderers: what answers a tip at 1 kHz; `replay` and `press` make theirs here too."""
+"""Renderers compute the force on a tip at 1 kHz; `replay` and `press` make theirs here too."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def renderer(
     is computed, some seconds, or read from its folder. Raises OptionError.
     """
     make = touched_scene(model, name, render, SupportOptions())
-    with call.progress("renderer") as tell:
-        return make(tell).renderer
+    with call.progress("renderer") as show_progress:
+        return make(show_progress).renderer
 
 
 def touched_scene(
@@ -53,14 +53,14 @@ def touched_scene(
         if given:
             words = "a renderer that is there keeps its options; give them to pp.renderer"
             raise OptionError(f"{', '.join(given)}: {words}")
-        return lambda tell: scene_of(model, support)
+        return lambda show_progress: scene_of(model, support)
     allowed = (*names(), *simulator_names())
     if name not in allowed:
         raise OptionError(unknown(name, "renderer", allowed))
     chosen = _with_scene(model, RenderOptions(**given))
 
-    def make(tell: Progress) -> TouchScene:
-        made = create(name, load(model, progress=tell), chosen, tell)
+    def make(show_progress: Progress) -> TouchScene:
+        made = create(name, load(model, progress=show_progress), chosen, show_progress)
         if made.model.path is not None:
             with_own_stiffness(made)
         return scene_of(made, support)

@@ -65,17 +65,19 @@ def replay(
             f"'{measured.name}' holds points without a time, and a replay needs a path: reconstruct, compare "
             "and diagnose read points"
         )
-    with call.progress("replay") as tell:
-        scene = make(tell)
+    with call.progress("replay") as show_progress:
+        scene = make(show_progress)
         check_near(measured, scene.model)
-        forces = replay_recording(scene, measured, tell)
+        forces = replay_recording(scene, measured, show_progress)
     presses, solved = _touched(measured, scene.model), None
     if exact:
         places = ExactPlaces(scene.renderer, measured.tip_radius_m)
         sites = deepest_of_sites(presses.site, presses.deepest)
         call.out.say(f"--exact: {said_beforehand(len(sites))}")
-        with call.progress("solving") as tell:
-            solved = exact_replay(places, presses, sites, measured.t, measured.position, forces, tell)
+        with call.progress("solving") as show_progress:
+            solved = exact_replay(
+                places, presses, sites, measured.t, measured.position, forces, show_progress
+            )
         forces = solved.force_n
     error = replay_error(measured, presses, forces)
     result = ReplayResult(

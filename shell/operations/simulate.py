@@ -1,10 +1,10 @@
-"""The virtual laboratory: a person explores a phantom, and what a device would have read is written down.
+"""The virtual laboratory: a person explores a phantom, and what a device would have read is recorded.
 
 PHANTOM is a name (cylinder, block, half-sphere, bean, dome, wedge, bowl) or a closed STL, PLY or VTU
 surface in metres that stands on its lowest plane. Without --effect the object is the ideal model: linear
 elastic, bonded to its support, sticking to the tip, readings exact but for white and slow noise. Solved
 touches are kept in the user's cache (PALPATE_CACHE), so that another seed, modulus, hand or instrument
-costs seconds, and an interrupted run goes on where it stopped.
+takes seconds, and an interrupted run goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -69,7 +69,12 @@ def simulate(
     seal: Annotated[bool, option("withhold the truth; needs --truth", only="command")] = False,
     truth: Annotated[
         str | None,
-        option("where truth (JSON) and, when sealed, salt go", metavar="PATH", writes=JSON, only="command"),
+        option(
+            "file for the truth (JSON) and, with --seal, the salt",
+            metavar="PATH",
+            writes=JSON,
+            only="command",
+        ),
     ] = None,
     person: Annotated[
         int, option("whose hand: 0 the average, 1... others", low=0, high=2**63 - 1, parse=natural)
@@ -81,7 +86,7 @@ def simulate(
     pictures: Annotated[
         str | None,
         option(
-            "also draw the path, the force and every press beside the ideal object",
+            "also draw the path, the force and every press compared with the ideal object",
             metavar="PNG",
             writes=PNG,
             only="command",
@@ -89,14 +94,12 @@ def simulate(
     ] = None,
     report: Annotated[
         str | None,
-        report_option(
-            "write the object to be turned, and every touch beside the ideal object's, as one HTML page"
-        ),
+        report_option("write one HTML page: the object in 3D, every touch compared with the ideal object's"),
     ] = None,
     workers: Annotated[
         int | None,
         option(
-            "processes that solve touches; None: one a core",
+            "processes that solve touches; None: one per core",
             low=1,
             high=2**63 - 1,
             parse=natural,
@@ -108,7 +111,7 @@ def simulate(
     hand: Given[HandOptions],
     call: Call,
 ) -> Simulation:
-    """The virtual laboratory: a person explores a phantom, and what a device would have read is written down.
+    """The virtual laboratory: a person explores a phantom, and what a device would have read is recorded.
 
     phantom: one of the names or a closed STL, PLY or VTU surface, m. effects: name to strength; none is the
     ideal model. save: NAME.csv.gz, with the truth in NAME.toml. Solved touches are kept in the user's cache.
@@ -124,12 +127,12 @@ def simulate(
     from palpate.show import next_lines
 
     if seal and not truth:
-        raise OptionError("--seal withholds the truth: say with --truth PATH where it shall be kept")
+        raise OptionError("--seal withholds the truth: give --truth PATH, where it is kept")
     if seal and report:
-        raise OptionError("--seal withholds the truth, which --report would tell: give one of them")
+        raise OptionError("--seal withholds the truth, which --report would show: give one of them")
     acting = effects_from(effects)
     thing = phantom if isinstance(phantom, Phantom) else named(phantom)
-    with call.progress("simulate") as tell:
+    with call.progress("simulate") as show_progress:
         made = simulated(
             thing,
             acting,
@@ -138,7 +141,7 @@ def simulate(
             sizes=sizes,
             ideal=ideal or pictures is not None or report is not None,
             staging=Staging(dataclasses.replace(cohort_hand(person), **hand)),
-            solving=Solving(workers, progress=tell),
+            solving=Solving(workers, progress=show_progress),
         )
     result = made if save is None or seal else made.save(save)
     if truth and not seal:
@@ -168,7 +171,7 @@ def _draw(result: Simulation, path: str) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class _Sealed:
-    """A simulation that does not tell its truth."""
+    """A simulation that does not show its truth."""
 
     made: Simulation
     path: Path
@@ -177,5 +180,5 @@ class _Sealed:
         return self.made.lines()[:1]
 
     def as_json(self) -> dict[str, Any]:
-        told = {key: value for key, value in self.made.as_json().items() if key != "truth"}
-        return {**told, "recording": str(self.path)}
+        kept = {key: value for key, value in self.made.as_json().items() if key != "truth"}
+        return {**kept, "recording": str(self.path)}

@@ -84,7 +84,7 @@ def touch(
     scene: Annotated[
         str | None,
         argument(
-            "what to touch; None: chosen in the window, without one demo",
+            "what to touch; None: chosen in the window, headless: demo",
             metavar="MODEL_OR_SCENE",
             count="?",
             reads=True,
@@ -94,7 +94,7 @@ def touch(
     device: Annotated[
         str | None, option(f"one of {', '.join(DEVICES)}; None: mouse; headless: simulated", metavar="NAME")
     ] = None,
-    headless: Annotated[bool, option("no window: all else is the same")] = False,
+    headless: Annotated[bool, option("run without a window, otherwise the same")] = False,
     seconds: Annotated[
         float | None, option("stop after this time; None: when the window closes", unit="s")
     ] = None,
@@ -196,10 +196,15 @@ class _Opening:
     compiling: Callable[[], object]
 
     def session(
-        self, stack: ExitStack, servo: StartedServo, scene: Scene, channel: PoseChannel | None, tell: Progress
+        self,
+        stack: ExitStack,
+        servo: StartedServo,
+        scene: Scene,
+        channel: PoseChannel | None,
+        show_progress: Progress,
     ) -> tuple[TouchSession, float | None]:
         """A started session, which the stack closes, and when its device will have done (s)."""
-        model = model_of(scene, lambda stage, share: tell(stage, 0.4 * share))
+        model = model_of(scene, lambda stage, share: show_progress(stage, 0.4 * share))
         if channel is not None:
             channel.write(time.perf_counter(), tuple(_above(model)))
         device, until = self.choice(model, channel)
@@ -207,14 +212,14 @@ class _Opening:
 
         def compiled() -> None:
             if options.renderer == "fem":
-                tell("compiling, once after an installation", 0.5)
+                show_progress("compiling, once after an installation", 0.5)
                 self.compiling()
 
         session = TouchSession(
             model, title=scene.title, device=device, mapping=mapping, options=options, started=servo
         )
         opened = stack.enter_context(session)
-        opened.start(lambda stage, share: tell(stage, 0.5 + 0.5 * share), compiled=compiled)
+        opened.start(lambda stage, share: show_progress(stage, 0.5 + 0.5 * share), compiled=compiled)
         return session, until
 
     def touched(self, session: TouchSession, scene: Scene) -> ServoRun:

@@ -80,7 +80,7 @@ def lock_memory() -> str:
 def real_time_thread(priority: int) -> str:
     """SCHED_FIFO for the calling thread; '' where that was granted, else why not."""
     if priority == 0:
-        return "SCHED_FIFO: not asked for"
+        return "SCHED_FIFO: not requested"
     if not hasattr(os, "sched_setscheduler"):
         return f"SCHED_FIFO: not supported on {sys.platform}"
     try:

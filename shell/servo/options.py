@@ -24,11 +24,11 @@ class ServoOptions:
     on_orphan: str = option(
         "stop", "when the window dies: stop with zero force, or go on", choices=("stop", "continue")
     )
-    coupling: bool = option(True, "soften stiffness beyond what the device renders stably")
+    coupling: bool = option(True, "limit the stiffness to what the device renders stably")
     read_ahead_s: float = option(250e-6, "how long before a tick the device is read", unit="s")
     silence_s: float = option(
         1.0,
-        "the window may be silent for so long; then no force",
+        "longest time without a message from the window; then the force is 0",
         unit="s",
         low=0.1,
         high=60.0,

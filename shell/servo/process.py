@@ -70,7 +70,7 @@ class ServoProcess:
         )
         offsets = np.array(job.options.tip_offsets_m, dtype=float)
         if len(offsets) > MOST_TIPS:
-            raise OptionError(f"{len(offsets)} tips were asked for; allowed are up to {MOST_TIPS}")
+            raise OptionError(f"{len(offsets)} tips were requested; allowed are up to {MOST_TIPS}")
         self._arrays = tick_arrays(block.arrays, offsets, np.zeros(3))
         self._source = job.source
         self._loop: ServoLoop | None = None

@@ -40,7 +40,8 @@ class Recorder:
             self._spool.seek(self._kept)
             self._spool.truncate()
             raise RecordingError(
-                f"the recording finds no room in {tempfile.gettempdir()} ({error.strerror}): free some, "
+                f"there is no room for the recording in {tempfile.gettempdir()} ({error.strerror}): free "
+                f"some, "
                 "or set TMPDIR to another place"
             ) from error
         self._kept += len(data)

@@ -39,7 +39,7 @@ def story(result: Calibration) -> Story:
     if result.bias_n is not None:
         yield Detail(f"bias: {', '.join(f'{v:.4f}' for v in result.bias_n)} N")
     if absent := result.about.get("not_told", []):
-        yield Detail(f"not found or not told: {', '.join(absent)}")
+        yield Detail(f"not found or not measurable: {', '.join(absent)}")
 
 
 def draw(result: Calibration, ax: Axes) -> None:

@@ -65,13 +65,13 @@ def _moduli(result: Changes) -> say.Story:
 
 def _cards(result: Changes) -> list[tuple[str, str, str]]:
     low, high = (100 * (r - 1) for r in result.ratio_ci95)
-    cause, beside = "not asked", "a diagnosis of both would tell"
+    cause, beside = "not diagnosed", "a diagnosis of both would show it"
     if result.before.diagnosis is not None:
         named = [spaced(n.replace("young_modulus", "Young's modulus")) for n in result.explained_by]
         cause, beside = listed(named) or "nothing", ""
     if result.beside is not None:
         left = 100 * (result.beside[0] - 1)
-        beside = f"with the effects of both taken in, the moduli differ by {left:+.0f} %"
+        beside = f"with the effects of both taken into account, the moduli differ by {left:+.0f} %"
     there = ("no shared places", "the two recordings share too few places, or no frame")
     if result.places:
         there = (
@@ -153,7 +153,7 @@ def _next_steps(result: Changes) -> list[str]:
     first = file_words(result.before.recording.path, "REC")
     second = file_words(result.after.recording.path, "REC2")
     if result.before.diagnosis is None:
-        return [f"ask what explains it: `palpate compare {first} {second}` without --no-diagnosis"]
+        return [f"find what explains it: `palpate compare {first} {second}` without --no-diagnosis"]
     if result.explained_by:
         return [f"see the evidence: `palpate diagnose {second} --report PAGE.html`"]
     return [

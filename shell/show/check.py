@@ -33,7 +33,7 @@ def story(result: Checkup) -> say.Story:
     recording, findings = result.recording, result.findings
     looked = "samples, presses and modulus" if result.full else "samples and presses"
     said = f"{counted(len(findings), 'finding')}, {len(result.grave)} grave"
-    said = said if findings else f"nothing to find fault with in its {looked}"
+    said = said if findings else f"no findings in its {looked}"
     yield say.Headline(f"{recording.name}, {recording.duration_s:.1f} s: {said}")
     yield say.Sentence(_meaning(result), on=say.PAGE)
     yield say.Next(_next_steps(result))
@@ -105,7 +105,7 @@ def _seen(words: str, here: float, usual: float) -> list[object]:
 
 def _meaning(result: Checkup) -> str:
     if not result.findings:
-        return "Nothing stands out that would move the modulus beyond its interval."
+        return "Nothing was found that would move the modulus beyond its interval."
     if any(f.grave for f in result.findings):
         return "The model could be another object's: `palpate reconstruct` refuses this without --force."
     return "The modulus's interval is widened by what was found; the model can be made as it is."

@@ -112,5 +112,5 @@ def place(result: Curve, plotter: Plotter) -> None:
 
 def _renderer(result: Curve) -> Renderer:
     if result.renderer is None:
-        raise OptionError("a curve that was read knows no renderer: press the model to draw it")
+        raise OptionError("a curve read from a file has no renderer: press the model to draw it")
     return result.renderer

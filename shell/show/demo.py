@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["KEYS", "draw", "place", "story", "view"]
 _STAGES = {
     "reconstruct": "from the recording to the model",
-    "precompute": "how every place gives",
+    "precompute": "the compliance of every place",
     "replay": "the recorded path once more",
     "feel at 1 kHz": "a simulated hand at 1000 forces a second",
     "diagnose": "what the simplest simulation leaves out",
@@ -77,7 +77,7 @@ def story(result: DemoResult) -> say.Story:
         ),
         model,
     )
-    yield say.Section("Measured beside rendered", _presses(result))
+    yield say.Section("Measured and rendered force", _presses(result))
     if result.diagnosis is not None:
         yield say.Section(
             "What a simpler simulation would leave out", [say.Sentence(diagnosis_words(result))]
@@ -177,7 +177,7 @@ def diagnosis_words(result: DemoResult) -> str:
         words += f" The model that you feel has {spoken(has)} already: its {law} law stands for it."
     rest = [name for name in found.effects if name not in there]
     if rest:
-        words += f" It does not have {spoken(rest)}: what to do about that stands in the page of "
+        words += f" It does not have {spoken(rest)}: what to do about that is in the page of "
         words += f"`palpate diagnose {file_words(result.recording.path, 'REC')} --report PAGE.html`."
     if found.candidates:
         words += f" These touches cannot rule out {spoken(found.candidates, 'or')}."
@@ -250,7 +250,7 @@ def view(result: DemoResult) -> View:
         None,
         each,
         "Rendered less measured, root mean square over each press; between presses what is near, "
-        "paler where nobody touched.",
+        "paler where it was not touched.",
     )
     first, *others = usual_colourings(model)
     return view_of_presses(model, shown, [first, error, *others], lines, int(np.argmax(each)))

@@ -44,7 +44,7 @@ def story(result: Explored) -> say.Story:
         *([go_on] if result.last.kind != "stop" else []),
     ])  # fmt: skip
     yield say.Rows(
-        ["goal", "now", "asked for", "reached"],
+        ["goal", "now", "wanted", "reached"],
         [[_NAMES[g.name], _goal(g.name, g.now), _goal(g.name, g.goal), _REACHED[g.met]] for g in state.goals],
     )
     yield say.Pictures([
@@ -58,7 +58,7 @@ def story(result: Explored) -> say.Story:
         )
         yield say.Section("Where it was touched", [say.Turned(lambda: view(result), flat)])
     yield say.Section("Every touch, and why there", [
-        say.Rows(["touch", "asked for because", "known after it"], _rows(result))
+        say.Rows(["touch", "suggested because", "known after it"], _rows(result))
     ])  # fmt: skip
 
 
@@ -128,7 +128,7 @@ def view(result: Explored) -> View | None:
     free = (surface.vertices - surface.support_point) @ up > 1e-6
     thing = Thing(surface.vertices, surface.triangles, free, surface.support_point, up)
     unsure = np.where(free, surface.uncertainty_m, np.nan)
-    words = "Standard deviation of the surface along its normal: the next touch goes where it tells most."
+    words = "Standard deviation of the surface along its normal: the next touch goes where it informs most."
     order = np.arange(1.0, len(touched) + 1)
     return View(
         thing,

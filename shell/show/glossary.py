@@ -12,10 +12,10 @@ from functools import cache
 WORDS = {
     "Young's modulus": "how stiff the material is, in Pa; soft silicone has 10 to 100 kPa",
     "Poisson's ratio": "how much it bulges when squeezed: 0.5 keeps its volume, 0.3 does not",
-    "finite strain": "large deformation: force grows differently than at small deformation",
+    "finite strain": "large deformation: force grows differently from what small deformations suggest",
     "neo-Hookean": "the simplest law of rubber at large strain",
     "dent law": "how force follows from the local dent under the tip: Hertz, linear, neo-Hookean",
-    "far field": "how much the object as a whole gives, beyond the dent",
+    "far field": "how much the object as a whole deforms, beyond the dent",
     "FEM": "the object cut into small pieces whose deformation is computed",
     "1D model": "spring and damper of one press, interpolated between presses",
     "Kelvin–Voigt": "a 1D model whose force is proportional to depth, with a damper in parallel",

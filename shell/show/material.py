@@ -37,16 +37,16 @@ def story(result: Material) -> say.Story:
     yield from (say.Sentence(f"{spaced(name)}: {meaning_of(name)}", on=say.PAGE) for name in result.effects)
     ranked = sorted(result.error.items(), key=lambda item: item[1])
     errors = ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked)
-    yield say.TextLine(f"error on what no fit has seen ({result.held_out}): {errors}")
+    yield say.TextLine(f"error on held-out data ({result.held_out}): {errors}")
     if result.closed is not None and result.closed_ci95 is not None:
         closed, low, high = (100 * min(share, 1.0) for share in (result.closed, *result.closed_ci95))
         interval = sure(f"{low:.0f}", f"{high:.0f} %")
-        yield say.TextLine(f"what was found takes away {closed:.0f} % of the gap ({interval})")
+        yield say.TextLine(f"what was found explains {closed:.0f} % of the gap ({interval})")
     yield say.Section("How far it is off", [
         say.Sentence(
             f"Each way was fitted to the rest and predicts what was left out ({result.held_out}). A spring "
             "and damper is what one has without a theory of the material; a regression follows the curves "
-            "without any mechanics, so little is left to gain beyond it."
+            "without any mechanics, so little can be gained beyond it."
         ),
         say.Rows(["predicted by", "off by"], [[_way(n), f"{100 * e:.2g} %"] for n, e in ranked]),
     ])  # fmt: skip
@@ -57,8 +57,8 @@ def story(result: Material) -> say.Story:
     yield from map(say.Note, result.notes)
     if result.unknown:
         unknown = ", ".join(map(spaced, result.unknown))
-        yield say.TextLine(f"not told by such a test: {unknown}")
-        yield say.Sentence(f"Such a test cannot tell: {unknown}", on=say.PAGE)
+        yield say.TextLine(f"such a test cannot determine: {unknown}")
+        yield say.Sentence(f"Such a test cannot determine: {unknown}", on=say.PAGE)
 
 
 def _first(result: Material) -> str:
@@ -123,8 +123,8 @@ def _modulus(result: Material) -> str:
 def meaning(result: Material) -> str:
     """What the answer means."""
     if not result.predicts:
-        return "What was left out is not predicted: do not use this answer."
-    words = f"On what the fit had not seen it is {100 * result.missed:.2g} % off."
+        return "The held-out data are not predicted: do not use this answer."
+    words = f"On held-out data it is {100 * result.missed:.2g} % off."
     if np.isfinite(result.young_modulus_pa):
         words = f"About as soft as {softness(result.young_modulus_pa)}. {words}"
     return words
@@ -213,7 +213,7 @@ def draw(result: Material, ax: Axes) -> None:
         best = min(rivals, key=lambda n: result.error[n]) if rivals else own
         names = [n for n in dict.fromkeys(("constant", "regression", best, own)) if n in result.error]
         ax.barh([_way(n) for n in names], [100 * result.error[n] for n in names], color="#2a9d8f", height=0.6)
-        ax.set(xlabel="error on what the fit has not seen [%]")
+        ax.set(xlabel="error on held-out data [%]")
         ax.spines[["top", "right"]].set_visible(False)
         return
     x, measured, predicted, across, up = result.seen

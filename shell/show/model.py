@@ -62,7 +62,7 @@ def usual_colourings(model: Model, presses: Presses | None = None) -> list[Colou
     stiffness = np.where(surface.touchable, surface.own_stiffness_n_per_m, np.nan)
     uncertainty = np.where(surface.touchable, surface.uncertainty_m, np.nan)
     modulus = presses.fits["e_pa"]
-    of_press = "Of each press by itself; between presses what is near, paler where nobody touched."
+    of_press = "Of each press by itself; between presses what is near, paler where it was not touched."
     found = [
         Colouring(ORDER, None, order, "Each dot is where a press met the surface, in order of time."),
         Colouring(MODULUS, None, modulus, of_press, name="modulus of a press"),

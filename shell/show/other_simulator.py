@@ -183,8 +183,9 @@ def story(result: SimulatedGap) -> say.Story:
     if sum(share > SHOWN for share in shares) > 1:
         yield say.Picture(
             lambda: drawn(draw, result, 9, 1.7),
-            "Taken off one after another, at places that no fit has seen: numerics, parameters, then what "
-            f"every ideal simulation lacks. Of what is left {percent(result.noise_share)} is the sensor's "
+            "Taken off one after another, at held-out places: numerics, parameters, then what "
+            f"every ideal simulation lacks. Of the remaining gap {percent(result.noise_share)} is the "
+            f"sensor's "
             f"noise and {percent(result.touch_share)} where exactly the object was first met.",
         )
     yield say.Section("", _seen(result))
@@ -277,7 +278,7 @@ def lead(result: SimulatedGap) -> str:
     if not said:
         if left > LITTLE:
             return f"{off}, and nothing that is known here explains {percent(left)} of that."
-        return "Nothing stands out: this simulation is as near to the measured forces as they can tell."
+        return "Nothing stands out: this simulation is as near to the measured forces as they can show."
     if left > most:
         return f"{off}, and {percent(left)} of that is not explained. A smaller part is: {said[0]}."
     return f"{off}. Above all: {'; then: '.join(said)}." + (
@@ -328,8 +329,8 @@ def _stated(result: SimulatedGap) -> say.Story:
 def _tried(result: SimulatedGap) -> say.Story:
     yield say.Sentence(
         "Each flaw of a simulator was held against the difference between its force and our own law's at the "
-        "parameters that it was given, where no sensor's noise stands in the way, and judged at places that "
-        "the fit had not seen. The difference left is that to the measured force once this alone is mended: "
+        "parameters that it was given, where no sensor's noise stands in the way, and judged at held-out "
+        "places. The difference left is that to the measured force once this alone is mended: "
         "of two flaws that hide one another it can be more than before. A flaw that takes much away and is "
         "unlikely is a worse account of the same than those that are named."
     )

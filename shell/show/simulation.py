@@ -44,7 +44,8 @@ def story(result: Simulation) -> say.Story:
     )
     noise = recording.force_noise_std_n
     yield say.Sentence(
-        "The recording holds what a device would have read; the truth stands beside it and is used by nobody."
+        "The recording holds what a device would have read; the truth is stored next to it and no "
+        "command uses it."
         + (f" The sensor's noise is {mn(noise)} an axis: a smaller effect is hard to see." if noise else ""),
         on=say.PAGE,
     )
@@ -58,8 +59,9 @@ def story(result: Simulation) -> say.Story:
         lambda: view(result),
         say.Picture(
             lambda: simulation_figure(result),
-            "Path of the tip, force in time, the longest drag or touch, and some presses; grey and dashed is "
-            "what the ideal object would answer to the same hand.",
+            "Path of the tip, force in time, the longest drag or touch, and some presses; grey and "
+            "dashed: the "
+            "force of the ideal object under the same hand.",
         ),
     )
     sizes = truth.get("sizes", {})

@@ -74,7 +74,7 @@ class Game:
         elif self.answers:
             last = self.answers[-1]
             first = (
-                f"{mm(last.off_m, '.1f')} beside the nodule after {last.seconds:.0f} s by "
+                f"{mm(last.off_m, '.1f')} from the nodule after {last.seconds:.0f} s by "
                 f"{last.renderer}: {last.score:.0f} points. Touch anew to go on, Tab for another renderer."
             )
         else:

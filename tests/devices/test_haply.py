@@ -192,7 +192,7 @@ def test_what_the_service_keeps_to_itself_is_declared_and_taken_off_the_limits()
     bench = chained(stubborn=True, damping=3.0, force_scale=None)
     try:
         spec, told = bench.device.spec, " ".join(bench.device.spec.conditions)
-        assert "damping filter of 3 N s/m" in told and "force scale is not told" in told
+        assert "damping filter of 3 N s/m" in told and "force scale is not reported" in told
         assert spec.max_damping_n_s_per_m == SPEC.max_damping_n_s_per_m - 3.0
     finally:
         bench.close()
@@ -238,7 +238,7 @@ def test_an_older_service_is_driven_as_before_and_says_what_it_does_not_tell() -
         bench.device.open()
         spec = bench.device.spec
         assert spec.max_force_n == SPEC.max_force_n
-        assert "does not tell its filters" in " ".join(spec.conditions)
+        assert "does not report its filters" in " ".join(spec.conditions)
         assert "configure" not in bench.service.messages[0]["inverse3"][0]
     finally:
         bench.close()
@@ -252,8 +252,8 @@ def test_another_force_scale_after_a_reconnection_is_no_silent_change() -> None:
         assert eventually(lambda: not bench.device.read().connected)
         bench.service.chain.force_scale = 1.0
         bench.replug()
-        assert eventually(lambda: "start anew" in bench.device.read().fault)
-        with pytest.raises(DeviceError, match="start anew"):
+        assert eventually(lambda: "start again" in bench.device.read().fault)
+        with pytest.raises(DeviceError, match="start again"):
             bench.device.enable_force()
     finally:
         bench.close()

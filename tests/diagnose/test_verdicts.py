@@ -202,7 +202,7 @@ def test_json_has_the_contract(delayed):
         "effects", "young_modulus_pa", "next_touch",
     } <= set(data)  # fmt: skip
     assert data["constant_rmse_n"] > data["gap_before_n"] > data["noise_n"] and data["at_bound"] == []
-    assert any("a constant push instead of a model" in line for line in delayed[2].lines())
+    assert any("a constant force instead of a model" in line for line in delayed[2].lines())
     assert [a["axis"] for a in data["where"]["axes"]] == [
         "depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air",
     ]  # fmt: skip
@@ -250,7 +250,7 @@ def test_finite_strain_is_named_only_where_it_predicts_better(nameless, monkeypa
     found = dataclasses.replace(findings.found, finite_strain_gain=30.0, finite_strain_closes=closes)
     answer = answer_of(dataclasses.replace(findings, found=found), findings.search.whitener.counts())
     assert ("finite_strain" in answer.names) == named
-    assert named != any("closes nothing" in reason for reason in answer.reasons)
+    assert named != any("does not shrink the gap" in reason for reason in answer.reasons)
 
 
 def test_the_page_says_what_to_do_and_its_view_switches_effects_on(

@@ -1,4 +1,4 @@
-"""An answer that does not predict, or stands on another object's shape, is said not to be believed."""
+"""An answer that does not predict, or stands on another object's shape, is called not reliable."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_the_command_ends_with_one_and_writes_everything(tmp_path, capsys):
     words = ["reconstruct", str(samples), "-o", str(model), "--json", str(figures), "--unit", "m"]
     assert cli.main([*words, "--shape", stl(tmp_path, "block")]) == 1
     said = capsys.readouterr().out
-    (line,) = [line for line in said.splitlines() if line.startswith("not to be believed")]
+    (line,) = [line for line in said.splitlines() if line.startswith("not reliable")]
     assert "another object's shape" in line
     assert read_model(model).material.young_modulus_pa > 0
     assert json.loads(figures.read_text())["doubt"] in line

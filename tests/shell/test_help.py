@@ -75,7 +75,7 @@ def test_help_all_ends_well(capsys):
         (["touch", "--headless", "--device", "simulted"], "simulated"),
     ],
 )
-def test_what_was_meant_is_told_in_one_line(words, meant, capsys, tmp_path, monkeypatch):
+def test_an_error_suggests_the_name_that_was_meant_in_one_line(words, meant, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     try:
         code = cli.main(words)

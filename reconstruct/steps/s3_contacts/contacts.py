@@ -58,22 +58,22 @@ class ContactOptions:
     )
     least_peak_n: float | None = option(
         None,
-        "a press must peak above this; None: tau",
+        "least peak force of a press; None: tau",
         unit="N",
         flag="--least-peak",
     )
-    least_duration_s: float = option(0.05, "a press must last so long", unit="s")
-    least_palpations: int = option(
-        LEAST_TOUCHES, "fewer usable presses are an error", flag="--least-palpations"
-    )
+    least_duration_s: float = option(0.05, "least duration of a press", unit="s")
+    least_palpations: int = option(LEAST_TOUCHES, "least number of usable presses", flag="--least-palpations")
     correct_delay: bool = option(
-        True, "shift a force that reads late (first against last touch); never in the paper's mode",
+        True, "correct a delay of the force, estimated from first and last touch; never in the paper's mode",
         flag="--correct-delay",
     )  # fmt: skip
-    site_m: float = option(SITE_M, "presses closer than this repeat one site", unit="m", flag="--site-size")
+    site_m: float = option(
+        SITE_M, "presses closer than this are repeats at one site", unit="m", flag="--site-size"
+    )
     free_air: str = option(
         "auto",
-        "of a known geometry: auto looks whether the tip is ever off the object, none takes the forces as "
+        "with a known geometry: auto checks whether the tip ever leaves the object, none takes the forces as "
         "tared",
         choices=("auto", "none"),
     )

@@ -48,7 +48,7 @@ def without_slides(measured: Measured, least: int) -> Measured:
     left = int((~slides).sum())
     if slides.any() and left < least:
         raise ContactError(
-            f"{left} presses are left beside {int(slides.sum())} contacts that slide over the surface; at "
+            f"{left} presses remain, next to {int(slides.sum())} contacts that slide over the surface; at "
             f"least {least} are needed: a slide has no first touch of its place, so press as well"
         )
     return _without(measured, np.where(slides, reason, "").tolist(), "slide")
@@ -68,7 +68,7 @@ def on_base(measured: Measured, base: Boundary, least: int) -> Measured:
     left = reasons.count("")
     if left < min(least, len(reasons)):
         raise ContactError(
-            f"{left} presses are left beside {len(reasons) - left} on the support of the known geometry; at "
+            f"{left} presses remain, next to {len(reasons) - left} on the support of the known geometry; at "
             f"least {least} are needed: press the object, or check --unit, --pose and --up"
         )
     return _without(dataclasses.replace(measured, boundary=base), reasons, None)

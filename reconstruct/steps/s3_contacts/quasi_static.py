@@ -82,8 +82,7 @@ def explore_points(recording: Recording, boundary: Boundary, options: ContactOpt
         shift, error = first_touches([g.loading for g in strong], noise)
     except ValueError as wrong:
         raise ContactError(
-            f"{wrong}, so where the tip met the surface cannot be told: probe some places at three depths or "
-            "more"
+            f"{wrong}, so where the tip met the surface is unknown: probe some places at three depths or more"
         ) from wrong
     presses = _tabled(recording, strong, shift, error, noise, options)
     return Measured(

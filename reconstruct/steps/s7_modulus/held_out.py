@@ -39,7 +39,7 @@ class HeldOutErrors:
 
     @property
     def doubt(self) -> str:
-        """Why the model is not to be believed; '' where it predicts."""
+        """Why the model is not reliable; '' where it predicts."""
         if self.model_n <= self.constant_n:
             return ""
         return (

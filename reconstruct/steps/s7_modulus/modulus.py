@@ -40,7 +40,7 @@ class ModulusOptions:
 
     law: str = option(
         "auto",
-        "dent of the tip: auto takes what the forces fit best",
+        "law of the dent under the tip: auto takes the one that fits the forces best",
         choices=("auto", *LAWS),
         flag="--dent-law",
     )
@@ -296,7 +296,7 @@ def _reason(
     if options.law == "auto":
         words += f", which fits best in {100 * shares[0]:.0f} % of draws of the places"
     if options.greatest_depth_m is not None:
-        return words + f"; from samples up to {limit * 1e3:g} mm deep, as asked"
+        return words + f"; from samples up to {limit * 1e3:g} mm deep (--greatest-depth)"
     if limit < deepest:
         return words + f"; from samples up to {limit * 1e3:g} mm deep, as deeper ones say otherwise"
     return words + "; from samples of all depths, as they agree"

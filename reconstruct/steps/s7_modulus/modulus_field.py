@@ -193,7 +193,7 @@ class FieldOptions:
 
     field: str = option(
         "homogeneous",
-        "a smooth field of the modulus: never, where the presses ask for one, or where they do and a 1D "
+        "a smooth field of the modulus: never, where the presses show one, or where they do and a 1D "
         "model predicts them better than one modulus does",
         choices=("homogeneous", "auto", "where-beaten"),
     )

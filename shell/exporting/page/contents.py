@@ -1,5 +1,5 @@
 """What stands in a page of a model: geometry, tables, modes of the far field, measured presses; and
-what its scripts are told."""
+what its scripts are given."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ UNKNOWN_SHARE = 0.1
 
 
 def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[PackedArrays, dict[str, Any]]:
-    """The arrays of a page, and what its scripts are told of the model."""
+    """The arrays of a page, and what its scripts are given of the model."""
     model, arrays = renderer.model, renderer.contact.arrays
     depths = depths_of(greatest_depth(renderer))
     block = PackedArrays()
@@ -133,8 +133,8 @@ def spacemouse_reports() -> list[dict[str, Any]]:
             data = bytearray(1 + length)
             data[0] = report
             data[1 + at : 3 + at] = int(spacemouse.FULL_SCALE).to_bytes(2, "little")
-            told = spacemouse.decode(bytes(data), spacemouse.Deflection())
-            for of, values in (("translation", told.translation), ("rotation", told.rotation)):
+            moved = spacemouse.decode(bytes(data), spacemouse.Deflection())
+            for of, values in (("translation", moved.translation), ("rotation", moved.rotation)):
                 fields += [
                     {"at": at, "of": of, "axis": axis, "sign": value}
                     for axis, value in enumerate(values)

@@ -31,7 +31,8 @@ from palpate.words import kpa, mm
 SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
 _VIRTUAL = (
-    " This object is a known shape of a known modulus that nobody touched: its presses are virtual, computed "
+    " This object is a known shape of a known modulus that was not touched: its presses are virtual, "
+    "computed "
     "by the same law."
 )
 
@@ -94,7 +95,7 @@ def left_out(model: Model) -> tuple[str, ...]:
     return (
         "second tip",
         f"memory of how fast and how often one pressed{remembers}",
-        "support beside the object",
+        "support next to the object",
         "depth beyond its tables",
     )
 

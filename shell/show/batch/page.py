@@ -68,7 +68,7 @@ def _lines(result: Batch) -> say.Story:
     if result.undescribed:
         names = ", ".join(path.name for path in result.undescribed[:3])
         rest = f" and {len(result.undescribed) - 3} more" if len(result.undescribed) > 3 else ""
-        yield say.TextLine(f"left aside, as no .toml beside describes them: {names}{rest}")
+        yield say.TextLine(f"left out, as no .toml next to them describes them: {names}{rest}")
     yield say.TextLine(f"written to {result.folder / 'index.html'}")
 
 
@@ -93,9 +93,7 @@ def _page(result: Batch) -> say.Story:
         )
     yield say.Markup(_recordings(result))
     if "compare" in result.steps:
-        yield say.Sentence(
-            "Errors of FEM and of the best 1D model: rms force at touches that no fit has seen."
-        )
+        yield say.Sentence("Errors of FEM and of the best 1D model: rms force at held-out touches.")
     yield say.Markup('<p>The table as a file: <a href="summary.csv">summary.csv</a>.</p>')
     if cost := _cost(result):
         yield say.Section("What it cost", [say.Markup(cost)])
@@ -111,7 +109,7 @@ def lead(result: Batch) -> str:
     count = {s: sum(e.row.status == s for e in result.entries) for s in ("done", "failed", "waiting")}
     parts = [f"{count['done']} of {counted(len(result.entries), 'recording')} done"]
     if count["failed"]:
-        parts.append(f"{count['failed']} failed, with the reason beside")
+        parts.append(f"{count['failed']} failed, with the reason next to it")
     if count["waiting"]:
         parts.append(f"{count['waiting']} not finished: run the same command again")
     return "; ".join(parts) + "."
@@ -166,7 +164,7 @@ def _agreement(result: Batch) -> say.Story:
     yield say.Sentence(
         "Spread: standard deviation of ln E between explorations, about the relative one. Where it is larger "
         "than what the recordings' own intervals let expect, something differs between the explorations that "
-        "no single one of them can see. Objects are told apart by the names that the recordings give them."
+        "no single one of them can see. Objects are distinguished by the names that the recordings give them."
     )
 
 

@@ -33,11 +33,11 @@ __all__ = ["KEYS", "draw", "place", "story", "view"]
 
 def story(result: Comparison) -> say.Story:
     """Which model predicts the next touch best, then the errors and where they are."""
-    yield say.Title(f"Who predicts the next touch: {getattr(result.recording, 'name', '')}")
+    yield say.Title(f"Which model predicts the next touch: {getattr(result.recording, 'name', '')}")
     yield say.Headline(lead(result))
     yield say.Detail(meaning(result))
     yield say.Next(_next_steps(result))
-    yield say.TextLine("error where no fit has looked, mN (in brackets: by how much the force is too large):")
+    yield say.TextLine("error at held-out places, mN (in brackets: by how much the force is too large):")
     names = list(result.rmse_n)
     yield say.Rows(
         ["  left out", "presses", *names],
@@ -46,7 +46,7 @@ def story(result: Comparison) -> say.Story:
         on=say.TEXT,
     )
     yield say.TextLine(
-        f"beside: the sensor's noise {mn(result.noise_n)}, a constant push instead of a model "
+        f"for comparison: the sensor's noise {mn(result.noise_n)}, a constant force instead of a model "
         f"{mn(result.constant_n)}"
     )
     yield say.TextLine(verdict(result))
@@ -64,7 +64,7 @@ def story(result: Comparison) -> say.Story:
     yield say.Section("What each model is made for", [
         say.Sentence(
             "The 1D models need no mesh and no base, and cost nothing to compute; inside a dense cloud of "
-            "touches they follow the object. Where nobody touched they repeat what the nearest touches felt, "
+            "touches they follow the object. At untouched places they repeat the nearest touches, "
             "and they have no tangential force. FEM carries shape and base to untouched places, and is as "
             "good as the shape."
         )
@@ -80,7 +80,7 @@ def _how(result: Comparison) -> say.Story:
         "paths. Errors are root mean squares of the force vector; the sensor's noise alone is "
         f"{mn(result.noise_n)}. The 1D models are fitted press by press and interpolated over the "
         "surface; FEM has one number for the whole object, its Young's modulus, or a smooth field of it "
-        "where the presses that it is fitted to ask for one: they did in "
+        "where the presses that it is fitted to show one: they did in "
         f"{sum(f is not None for f in result.fields)} of {len(result.fields)} fits."
     )
     for name in (n for n in compared(result) if n not in MODELS):
@@ -166,7 +166,7 @@ def _next_steps(result: Comparison) -> list[str]:
     recording = file_words(None if result.recording is None else result.recording.path, "REC")
     return [
         f"feel it: `palpate touch {model} --beside hunt-crossley`",
-        f"ask what the FEM still leaves out: `palpate diagnose {recording} --model {model}`",
+        f"find what the FEM still leaves out: `palpate diagnose {recording} --model {model}`",
     ]
 
 
@@ -176,7 +176,7 @@ def lead(result: Comparison) -> str:
     ratio = result.rmse_n[best] / max(result.rmse_n["fem"], 1e-12)
     if ratio >= 1.05:
         return (
-            f"The FEM predicts a touch that it has not seen {ratio:.1f} times better than the better of the "
+            f"The FEM predicts a held-out touch {ratio:.1f} times better than the better of the "
             f"two 1D models ({called(best)})."
         )
     if ratio > 0.95:
@@ -189,9 +189,9 @@ def meaning(result: Comparison) -> str:
     best = min(RIVALS, key=lambda name: result.rmse_n[name])
     fem, other, noise = (1e3 * v for v in (result.rmse_n["fem"], result.rmse_n[best], result.noise_n))
     words = (
-        f"At a place that it has not seen the FEM is {fem:.0f} mN off, {called(best)} {other:.0f} mN, of "
+        f"At a held-out place the FEM is {fem:.0f} mN off, {called(best)} {other:.0f} mN, of "
         f"which the sensor's noise is {noise:.0f} mN."
     )
     if result.rmse_n["fem"] < 1.3 * result.noise_n:
-        words += " The FEM's share of its error is smaller than what the sensor can tell."
+        words += " The FEM's share of its error is smaller than the sensor can resolve."
     return words

@@ -169,7 +169,7 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
     for name in (n for n in compared(result) if n in forces):  # a simulator was run along the path alone
         ax.plot(x, forces[name][order], "o", ms=4, color=COLOURS.get(name, OTHER), label=called(name))
     measured = _at_depth(result)
-    for inside, face, label in ((False, "none", "measured, seen"), (True, None, "measured, left out")):
+    for inside, face, label in ((False, "none", "measured, fitted"), (True, None, "measured, left out")):
         chosen = family & (members == inside) & np.isfinite(measured)
         ax.plot(
             coordinate[chosen] * 1e3,

@@ -77,7 +77,7 @@ def view(result: Diagnosis) -> View:
         None,
         each,
         "Measured less simulated, root mean square over each press; between presses what is near, "
-        "paler where nobody touched.",
+        "paler where it was not touched.",
     )
     force = "sideways" if sideways(result) else "into"
     return view_of_presses(model, t, [error, *usual_colourings(model, t)], lines, worst_press(result), force)

@@ -79,11 +79,11 @@ def story(result: Diagnosis) -> say.Story:
     yield say.Section("", _shown(result))
     if result.next_touch is not None:
         heading = "To be sure: touch here next" if result.unsettled else "If you touch it once more"
-        hangs = "" if result.unsettled else " Nothing hangs on it: the answer above stands without."
+        hangs = "" if result.unsettled else " It is optional: the answer above does not depend on it."
         yield say.Section(heading, [say.Sentence(f"{ended(touch_words(result))}{hangs}")])
     yield say.Section("How large", _how_large(result))
     yield say.Section("Everything that was tried", _tried(result))
-    yield say.Section("What the difference goes with", _follows(result))
+    yield say.Section("What the difference depends on", _follows(result))
     yield say.Section("What the comparison itself may get wrong", _own_errors(result))
 
 
@@ -95,15 +95,15 @@ def _how_far(result: Diagnosis) -> say.Story:
         yield say.TextLine(f"{off}, {force_words(result.gap_after_n)} with what was found{noise}")
         interval = f"95 % sure: {between_words(*result.gap_closed_ci95)}"
         yield say.Detail(
-            f"{percent(result.gap_closed)} of what lies above the noise is gone ({interval}), at places that "
-            "were not fitted",
+            f"{percent(result.gap_closed)} of the gap above the noise is explained ({interval}), at held-out "
+            "places",
             on=say.TEXT,
         )
     else:
         yield say.TextLine(f"{off}{noise}")
     if result.constant_n is not None:
         constant = force_words(result.constant_n)
-        yield say.Detail(f"a constant push instead of a model would be {constant} off", on=say.TEXT)
+        yield say.Detail(f"a constant force instead of a model would be {constant} off", on=say.TEXT)
 
 
 def _means(result: Diagnosis) -> say.Story:
@@ -142,7 +142,7 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
     if not asked:
         yield f"feel it: `palpate touch {file_words(model.path, 'MODEL')}`"
     if result.next_touch is not None and result.unsettled:
-        yield "touch once more where it says below, which would settle what is open"
+        yield "touch once more at the place given below, to decide between the candidates"
 
 
 def _caption(result: Diagnosis) -> str:
@@ -155,11 +155,11 @@ def _caption(result: Diagnosis) -> str:
 
 
 def _gains_caption(result: Diagnosis) -> str:
-    simplest = "The simplest simulation knows small deformations of one stiffness alone"
+    simplest = "The simplest simulation has small deformations and one stiffness only"
     there = [n for n in result.effects if n in in_model(result)]
     has = f"; the model itself has {spoken(there)} already" if there else ""
     nothing = "" if result.effects else " Nothing that was tried is large and steady enough to be named."
-    return f"{simplest}{has}. All at places that the fit had not seen.{nothing}"
+    return f"{simplest}{has}. All at held-out places.{nothing}"
 
 
 def _modulus_words(model: Model, result: Diagnosis) -> str:
@@ -197,11 +197,11 @@ def _tried(result: Diagnosis) -> say.Story:
     strain = next((e.gap_closed for e in result.entries if e.name == known()), None)
     beside = {e.name: with_strain(result, e.name) for e in result.entries}
     marked = (
-        f" Those marked + were tried beside {spaced(known())}, which every soft solid shows when it is "
-        "pressed deep; of them only what they take away on top of that counts."
+        f" Those marked + were tried together with {spaced(known())}, which every soft solid shows when "
+        "it is pressed deep: only what they take away in addition counts."
     )
     yield say.Sentence(
-        "Each effect was put into the simulation, fitted, and judged at places that the fit had not seen. "
+        "Each effect was put into the simulation, fitted, and judged at held-out places. "
         f"The best comes first.{marked if any(beside.values()) else ''}"
     )
     yield say.Rows(
@@ -235,7 +235,7 @@ def _taken(closed: float | None, strain: float | None) -> str:
 
 
 def goes_with(result: Diagnosis | SimulatedGap, heading: str) -> say.Rows:
-    """What the difference goes with, the most first."""
+    """What the difference depends on, the most first."""
     return say.Rows(
         [heading, "share of it", "how often chance does this"],
         [

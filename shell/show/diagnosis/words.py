@@ -28,7 +28,7 @@ AXIS_WORDS = {
 ERROR_WORDS = {
     "sensor": "noise of the force sensor",
     "repeatability": "touching one place again does not give the same force",
-    "shape": "the object's shape is not known where nobody touched",
+    "shape": "the object's shape is not known where it was not touched",
 }
 
 
@@ -51,7 +51,7 @@ def verdict(result: Diagnosis) -> str:
     left_out, there = spoken(missing(result)), spoken([n for n in result.effects if n in in_model(result)])
     rivals = spoken(result.candidates, "or")
     if result.kind == "none":
-        return "Measured and simulated force agree: nothing is missing that these touches could show."
+        return "Measured and simulated force agree: these touches show no missing effect."
     if result.kind == "unknown":
         return "Measured and simulated force differ, and nothing that this program knows explains it" + (
             f"; {rivals} is suspected." if rivals else "."
@@ -113,18 +113,18 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
         )  # fmt: skip
     if result.candidates:
         also = "; ".join(f"{spaced(n)}: {meaning(n)}" for n in result.candidates)
-        text = f"Not ruled out: {also}. The touch proposed below would tell."
-        return question, "These touches cannot tell", text
+        text = f"Not ruled out: {also}. The touch proposed below would decide it."
+        return question, "These touches cannot decide", text
     if not result.effects:
         return question, "The gap is there, its cause is open", (
-            "None of the effects that were tried takes it away at places that the fit had not seen."
+            "None of the effects that were tried takes it away at held-out places."
         )  # fmt: skip
     sure = {e.name: e.probability for e in result.entries if e.name in result.effects}
     least = min(sure, key=lambda name: sure[name])
     text = (
         f"Of 100 such answers on simulated recordings whose truth is known, {100 * sure[least]:.0f} "
         f"{'or more ' if len(sure) > 1 else ''}were right. Every other "
-        "effect that was tried explains less at places that the fit had not seen."
+        "effect that was tried explains less at held-out places."
     )
     if len(sure) == 1:
         return question, f"{percent(sure[least])} sure", text
@@ -148,11 +148,11 @@ def where(result: Diagnosis) -> tuple[str, str, str]:
     size = f": {force_words(rms)}" if rms > result.gap_before_n else ""
     there = f"It is largest at {largest} (the press shown){size}."
     if axis.share < LITTLE:
-        most = f"What it goes with most is {AXIS_WORDS[axis.axis]}, and that is {percent(axis.share)} of it."
+        most = f"It depends most on {AXIS_WORDS[axis.axis]}, which explains {percent(axis.share)} of it."
         return question, "Everywhere alike", f"{most} {there}"
     chance = "" if axis.p < 0.05 else " That may be chance."
     if axis.axis != "direction":
-        text = f"{percent(axis.share)} of the difference goes with it.{chance} {there}"
+        text = f"{percent(axis.share)} of the difference depends on it.{chance} {there}"
         return question, f"It changes with {AXIS_WORDS[axis.axis]}", text
     text = f"{percent(axis.share)} of the difference lies along the surface, not into it.{chance} "
     headline, times = "In the sideways force", depth_contrast(result)
@@ -166,7 +166,7 @@ def where(result: Diagnosis) -> tuple[str, str, str]:
 def _how_far(result: Diagnosis) -> tuple[str, str, str]:
     question = "How far does it shrink?"
     before, noise = force_words(result.gap_before_n), force_words(result.noise_n)
-    typical = "Root mean square at places that the fit had not seen"
+    typical = "Root mean square at held-out places"
     if result.effects and result.gap_closed is not None and result.gap_closed_ci95 is not None:
         low, high = result.gap_closed_ci95
         after = force_words(result.gap_after_n)
@@ -175,14 +175,14 @@ def _how_far(result: Diagnosis) -> tuple[str, str, str]:
                 f"{typical}. What was found does not lower it there. The sensor's own noise is {noise}."
             )  # fmt: skip
         text = (
-            f"{typical}. The sensor's own noise is {noise}: {percent(result.gap_closed)} of what lies above "
-            f"it is gone (95 % sure: {between_words(low, high)})."
+            f"{typical}. The sensor's own noise is {noise}: {percent(result.gap_closed)} of the gap above "
+            f"it is explained (95 % sure: {between_words(low, high)})."
         )
         return question, f"From {before} to {after}", text
     text = f"{typical}: {before}. The sensor's own noise is {noise}."
     if result.kind == "none":
-        return question, "There is nothing to shrink", text
-    return question, f"It stays at {before}", text + " With no effect found, nothing of it is gone."
+        return question, "There is no gap to shrink", text
+    return question, f"It stays at {before}", text + " No effect was found that explains it."
 
 
 def named(result: Diagnosis, name: str) -> str:
@@ -205,10 +205,11 @@ def touch_words(result: Diagnosis) -> str:
     assert touch is not None
     parted = " from ".join(map(spaced, touch.separates))
     if touch.kind != "press":
-        return f"to tell {parted}: {touch.why}"
+        return f"to separate {parted}: {touch.why}"
     direction = ", ".join(f"{round(d, 2) + 0.0:g}" for d in touch.direction)
     hold = f", and hold for {touch.hold_s:.1f} s" if touch.hold_s > 0.05 else ""
     return (
-        f"to tell {parted}, press at {place_mm((touch.x, touch.y, touch.z))} in the direction ({direction}), "
+        f"to separate {parted}, press at {place_mm((touch.x, touch.y, touch.z))} in the direction "
+        f"({direction}), "
         f"{mm(touch.depth_m, '.1f')} deep at {mm(touch.speed_m_per_s, '.0f')}/s{hold}: {touch.why}"
     )

@@ -45,7 +45,7 @@ def _first_touch(result: Reconstruction) -> str:
     )
     if result.exploration.delay_s:
         words += (
-            f" The force reads {result.exploration.delay_s * 1e3:.0f} ms late, as first and last touch tell; "
+            f" The force reads {result.exploration.delay_s * 1e3:.0f} ms late, as first and last touch show; "
             "it was shifted before anything else."
         )
     return words
@@ -72,7 +72,7 @@ def _load(result: Reconstruction) -> str:
         return (
             "Load. The paper puts the whole force on the node nearest to the contact. A point load has no "
             "limit as the mesh gets finer (table above), so its modulus belongs to its mesh. Here the tip's "
-            "own dent follows a law of its size and the mesh carries what the whole object gives."
+            "own dent follows a law of its size and the mesh carries the deformation of the whole object."
         )
     return (
         "Load. As in the paper, the whole force is put on the node nearest to the contact. A point load has "
@@ -86,7 +86,7 @@ def _law(fit: ModulusFit) -> str:
     low, high = (100 * (e / fit.modulus_pa - 1) for e in fit.ci95_pa)
     return (
         "Law and interval. The paper is linear and gives no interval. Here the dent follows the "
-        f"{fit.press.law} law (what the forces fit best), and the interval ({low:+.1f} to {high:+.1f} %) "
+        f"{fit.press.law} law (it fits the forces best), and the interval ({low:+.1f} to {high:+.1f} %) "
         "holds the spread between sites, the choice of the law, the shape's uncertainty and 2 % common to "
         "everything."
     )
@@ -102,11 +102,11 @@ def trend_words(result: Reconstruction) -> str:
     if k.pearson_p > _CHANCE:
         return (
             "Height. In the paper the 1D stiffness of presses on the side goes with the height; here that "
-            f"cannot be told from chance (k_V changes by {of_k}, the modulus by {of_e})."
+            f"may be chance (k_V changes by {of_k}, the modulus by {of_e})."
         )
     words = f"Height. As in the paper, the 1D stiffness of presses on the side goes with height (k_V: {of_k})"
     if abs(e.change) < 0.25 * abs(k.change):
         return f"{words} and the modulus does not, or much less ({of_e}): as it should be."
     if e.pearson_p > _CHANCE:
-        return f"{words}; that the modulus does so ({of_e}) cannot be told from chance."
+        return f"{words}; that the modulus does so ({of_e}) may be chance."
     return f"{words}. Here the modulus does so as well ({of_e}), other than the paper's."

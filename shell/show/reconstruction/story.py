@@ -93,7 +93,7 @@ def story(result: Reconstruction, beside: dict[str, Model] | None = None) -> say
 
 def _meant(result: Reconstruction) -> say.Story:
     if result.doubt:
-        yield say.TextLine(f"not to be believed: {result.doubt}")
+        yield say.TextLine(f"not reliable: {result.doubt}")
     else:
         yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in meaning(result).split(". "))
     yield say.Detail(meaning(result), on=say.PAGE)
@@ -260,13 +260,13 @@ def next_steps(result: Reconstruction) -> list[str]:
 def lost(result: Reconstruction) -> str:
     """That a 1D model predicts places better that were held out, and what may help, before what else is said;
     '' where none does."""
-    told = result.held_out
-    if told is None or not told.beaten_by:
+    held_out = result.held_out
+    if held_out is None or not held_out.beaten_by:
         return ""
     one = result.model.provenance["options"]["modulus_field"]["field"] == "homogeneous"
     return (
-        f"{told.beaten_by}, a 1D model, errs by {mn(told.floor_n, '.2g')} on places that were held out and "
-        f"this model by {mn(told.model_n, '.2g')}{' (--field auto may help)' if one else ''}; "
+        f"{held_out.beaten_by}, a 1D model, errs by {mn(held_out.floor_n, '.2g')} at held-out places and "
+        f"this model by {mn(held_out.model_n, '.2g')}{' (--field auto may help)' if one else ''}; "
     )
 
 
@@ -311,7 +311,7 @@ def _how(result: Reconstruction) -> say.Story:
         yield say.Sentence(
             f"The modulus: {fit.reason}. From place to place it differs by "
             f"{100 * fit.between:.1f} %; what is not known of the shape makes it uncertain by another "
-            f"{100 * fit.shape_error:.2f} %. Which law is best was asked again of places drawn at random; "
+            f"{100 * fit.shape_error:.2f} %. The best law was chosen again from places drawn at random; "
             "the last column says how often it was each."
         )
         yield say.Rows(
@@ -358,14 +358,14 @@ def _percentiles(values: np.ndarray) -> dict[str, float]:
 
 
 def _held_out(result: Reconstruction) -> dict[str, Any]:
-    told = result.held_out
-    floor = told is not None and bool(told.floor)
+    held_out = result.held_out
+    floor = held_out is not None and bool(held_out.floor)
     return {
-        "held_out_rmse_n": told.model_n if told else None,
-        "held_out_constant_rmse_n": told.constant_n if told else None,
-        "held_out_floor": told.floor if told and floor else None,
-        "held_out_floor_rmse_n": told.floor_n if told and floor else None,
-        "beaten_by": (told.beaten_by or None) if told else None,
+        "held_out_rmse_n": held_out.model_n if held_out else None,
+        "held_out_constant_rmse_n": held_out.constant_n if held_out else None,
+        "held_out_floor": held_out.floor if held_out and floor else None,
+        "held_out_floor_rmse_n": held_out.floor_n if held_out and floor else None,
+        "beaten_by": (held_out.beaten_by or None) if held_out else None,
     }
 
 

@@ -126,7 +126,7 @@ _PARAMETERS = {"k_v": "stiffness k_V", "k_h": "stiffness k_H", "e_pa": "modulus 
 
 def trends_table(trends: list[Trend]) -> Story:
     if not trends:
-        yield Sentence("Fewer than five presses on the side: no trend with height can be told.")
+        yield Sentence("Fewer than five presses on the side: no trend with height can be determined.")
         return
     yield Sentence(
         f"Does a parameter go with the height of the {trends[0].presses} presses on the side? The stiffness "
@@ -152,7 +152,7 @@ def trends_table(trends: list[Trend]) -> Story:
 def point_load_table(result: Reconstruction) -> Story:
     yield Sentence(
         "Why the paper's modulus depends on the mesh: displacement of a loaded node per newton (linear "
-        "tetrahedra) as the mesh is refined near the surface, beside that of a load spread over a patch "
+        "tetrahedra) as the mesh is refined near the surface, and that of a load spread over a patch "
         "(quadratic tetrahedra)."
     )
     yield Rows(

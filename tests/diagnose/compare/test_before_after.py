@@ -88,4 +88,4 @@ def test_it_prints_draws_and_writes_a_page(tmp_path):
 def test_a_model_goes_with_one_recording(tmp_path, capsys):
     words = ["compare", "silicone-1-cylinder", "silicone-1-cylinder", "--model", "demo"]
     assert cli.main(words) == 2
-    assert "--model goes with one recording" in capsys.readouterr().err
+    assert "--model needs one recording" in capsys.readouterr().err

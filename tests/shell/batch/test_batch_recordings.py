@@ -222,7 +222,7 @@ def test_a_model_that_is_not_to_be_believed_ends_with_1_and_says_why(tmp_path, q
     out = tmp_path / "out"
     assert cli.main(["batch", str(tmp_path / "in"), "-o", str(out)]) == 1
     rows = {row["recording"]: row for row in csv.DictReader((out / "summary.csv").open())}
-    assert rows["odd"]["status"] == "done" and rows["odd"]["reason"] == f"not to be believed: {why}"
+    assert rows["odd"]["status"] == "done" and rows["odd"]["reason"] == f"not reliable: {why}"
     assert rows["good"]["reason"] == "" and why in capsys.readouterr().out
 
 

@@ -63,7 +63,7 @@ def test_what_was_said_is_told_from_what_was_guessed_and_a_turned_force_is_told(
     for words in (
         "x = x [mm] (guessed, unit said)",
         "fz = fz [N] (said)",
-        "on the object, as said: turned round",
+        "on the object, as stated: turned round",
     ):
         assert words in str(made)
     made.save(tmp_path / "mine.csv")

@@ -14,7 +14,7 @@ import palpate as pp
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.progress import silent
 from palpate.operations import diagnose
-from palpate.operations._simulators import Ran, mended_by, run_along, told
+from palpate.operations._simulators import Ran, mended_by, run_along, time_words
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.render.options import RenderOptions
 
@@ -31,8 +31,8 @@ def test_what_mends_goes_on_top_of_what_was_asked():
 
 
 def test_a_long_run_says_how_long_and_what_fewer_presses_take():
-    assert re.findall(r"\d+", told(1200.0, 12)) == ["20", "6", "10"]
-    assert told(30.0, 12) == "about 0.5 min in all" and "--presses" not in told(1200.0, 6)
+    assert re.findall(r"\d+", time_words(1200.0, 12)) == ["20", "6", "10"]
+    assert time_words(30.0, 12) == "about 0.5 min in all" and "--presses" not in time_words(1200.0, 6)
 
 
 @dataclass(frozen=True)
