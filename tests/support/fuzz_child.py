@@ -176,9 +176,10 @@ def cpu_s(pid: int) -> float:
 
 
 def clone_environment(**variables: str) -> dict[str, str]:
-    """`module_environment`, in which the clone's own `tests` are found too."""
-    found = dict(os.environ, **variables)
-    return {**found, "PYTHONPATH": os.pathsep.join([found["PYTHONPATH"], str(CLONE)])}
+    """This process's environment and `variables`, in which the clone's own `tests` are found too."""
+    before = os.environ.get("PYTHONPATH")
+    path = os.pathsep.join([str(CLONE), *([before] if before else [])])
+    return {**os.environ, "PYTHONPATH": path, **variables}
 
 
 if __name__ == "__main__":
