@@ -1,22 +1,18 @@
-"""Which folder of the repository is installed as which package: everything is `palpate` or below it."""
+"""The folders of the repository are installed as `palpate` and packages below it, as pyproject.toml says."""
+
+import tomllib
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
-FOLDERS = {
-    "palpate": "shell",
-    "palpate.mechanics": "mechanics",
-    "palpate.reconstruction": "reconstruct",
-    "palpate.render": "render",
-    "palpate.devices": "devices",
-    "palpate.scenes": "scenes",
-    "palpate.diagnosis": "diagnose",
-}
+with open(Path(__file__).parent / "pyproject.toml", "rb") as file:
+    rooms = tomllib.load(file)["tool"]["palpate"]["rooms"]
 
 setup(
-    package_dir=FOLDERS,
+    package_dir={package: folder for folder, package in rooms.items()},
     packages=[
         package
-        for name, folder in FOLDERS.items()
-        for package in (name, *(f"{name}.{below}" for below in find_packages(folder)))
+        for folder, room in rooms.items()
+        for package in (room, *(f"{room}.{below}" for below in find_packages(folder)))
     ],
 )

@@ -175,7 +175,9 @@ def _releases_between(root: Path, commit: str) -> int:
 
 
 def _measured(root: Path, name: str) -> list[str]:
-    """The packages that a benchmark imports, itself and by its helpers; all where it is gone."""
+    """The rooms that a benchmark imports, itself and by its helpers; all where it is gone."""
+    text = (root / "pyproject.toml").read_text(encoding="utf-8")
+    rooms = {package: folder for folder, package in tomllib.loads(text)["tool"]["palpate"]["rooms"].items()}
     seen: set[str] = set()
     waiting = [f"benchmarks.{name.replace('-', '_')}"]
     packages: set[str] = set()
@@ -190,8 +192,8 @@ def _measured(root: Path, name: str) -> list[str]:
         ):
             if found.startswith("benchmarks."):
                 waiting.append(found)
-            elif (root / found.partition(".")[0] / "__init__.py").is_file():
-                packages.add(found.partition(".")[0])
+            elif found.partition(".")[0] == "palpate":
+                packages.add(rooms.get(".".join(found.split(".")[:2]), rooms["palpate"]))
     return sorted(packages) or ["."]
 
 

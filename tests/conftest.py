@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import os
-import re
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -76,17 +75,19 @@ def other_than(clone: Path) -> list[str]:
     return sorted(name for name in ours.keys() | installed.keys() if ours.get(name) != installed.get(name))
 
 
+def rooms(clone: Path) -> dict[str, str]:
+    """Folder of the clone -> the package that it is installed as."""
+    text = (clone / "pyproject.toml").read_text(encoding="utf-8")
+    return dict(tomllib.loads(text)["tool"]["palpate"]["rooms"])
+
+
 def modules_of(clone: Path) -> dict[str, Path]:
-    """Dotted name -> file of every module that the clone's `setup.py` installs."""
-    folders = re.search(
-        r"^FOLDERS = (\{.*?^\})", (clone / "setup.py").read_text(encoding="utf-8"), re.M | re.S
-    )
-    assert folders, "setup.py says which folder is which package"
+    """Dotted name -> file of every module that the clone installs."""
     return {
         ".".join([package, *path.relative_to(clone / folder).with_suffix("").parts]).removesuffix(
             ".__init__"
         ): path
-        for package, folder in ast.literal_eval(folders[1]).items()
+        for folder, package in rooms(clone).items()
         for path in (clone / folder).rglob("*.py")
     }
 

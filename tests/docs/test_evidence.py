@@ -78,12 +78,15 @@ def test_a_page_says_when_its_figures_are_older_than_the_code_by_a_release(tmp_p
         subprocess.run(["git", "-C", str(tmp_path), *identity, *words], check=True, capture_output=True)
 
     def state(version, code, other=""):
-        (tmp_path / "pyproject.toml").write_text(f'[project]\nname = "p"\nversion = "{version}"\n')
+        rooms = "".join(f'{room} = "palpate.{room}"\n' for room in ("mechanics", "scenes"))
+        (tmp_path / "pyproject.toml").write_text(
+            f'[project]\nname = "p"\nversion = "{version}"\n[tool.palpate.rooms]\nshell = "palpate"\n{rooms}'
+        )
         for folder, words in (("mechanics", code), ("scenes", other), ("benchmarks", "")):
             (tmp_path / folder).mkdir(exist_ok=True)
             (tmp_path / folder / "__init__.py").write_text(words)
         (tmp_path / "benchmarks" / "speed.py").write_text("from benchmarks._deep import run\n")
-        (tmp_path / "benchmarks" / "_deep.py").write_text("import mechanics\n")
+        (tmp_path / "benchmarks" / "_deep.py").write_text("from palpate.mechanics import a\n")
         git("add", "-A")
         git("commit", "-q", "--allow-empty", "-m", version)
         said = subprocess.run(

@@ -15,8 +15,9 @@ from palpate.mechanics.plausible import COLUMN, CURVE, EXPLORATION, TIP_RADIUS, 
 from palpate.mechanics.quantities import parse_unit, prefixed, quantity_words, read_unit, unit_of_key
 from palpate.mechanics.recording import recording
 
+from ..conftest import rooms
+
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("mechanics", "reconstruct", "render", "devices", "scenes", "diagnose", "shell")
 WITHOUT_UNIT_IN_NAME = {"boundary_phase": "s", "support_point": "m", "angle": "rad"}
 
 
@@ -67,8 +68,8 @@ def test_a_key_states_the_unit_that_its_name_ends_with():
 def test_every_unit_that_the_program_states_can_be_parsed():
     stated = {
         (path.name, keyword.value.value)
-        for package in PACKAGES
-        for path in (ROOT / package).rglob("*.py")
+        for folder in rooms(ROOT)
+        for path in (ROOT / folder).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") in ("option", "FileKey")
         for keyword in node.keywords

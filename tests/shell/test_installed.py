@@ -15,9 +15,8 @@ import pytest
 import palpate as pp
 from palpate.mechanics.kernel_cache import ROOMS, sources
 
-from ..conftest import REPOSITORY, modules_of
+from ..conftest import REPOSITORY, modules_of, rooms
 
-ROOM_FOLDERS = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "shell")
 EXTRAS = {"palpate.render.simulators.drake_scene", "palpate.render.simulators.newton_scene"}
 """Modules that need a library which the tests do without."""
 
@@ -38,13 +37,11 @@ def test_one_name_is_installed():
 
 def test_every_module_and_file_of_the_clone_is_installed():
     installed = {name for name in recorded() if name.startswith("palpate/") and "__pycache__" not in name}
-    rooms = {"palpate": "shell", "palpate/reconstruction": "reconstruct", "palpate/diagnosis": "diagnose"}
-    rooms |= {f"palpate/{room}": room for room in ROOMS if f"palpate/{room}" not in rooms}
-    words = ["git", "-C", str(REPOSITORY), "ls-files", "--", *ROOM_FOLDERS]
+    words = ["git", "-C", str(REPOSITORY), "ls-files", "--", *rooms(REPOSITORY)]
     done = subprocess.run(words, capture_output=True, text=True)
     if done.returncode != 0:
         pytest.skip("not a clone")
-    homes = {folder: package for package, folder in rooms.items()}
+    homes = {folder: package.replace(".", "/") for folder, package in rooms(REPOSITORY).items()}
     tracked = {f"{homes[top]}/{rest}" for top, _, rest in (n.partition("/") for n in done.stdout.split())}
     assert installed == {name for name in tracked if not name.endswith(".md")}
 
@@ -55,7 +52,7 @@ def test_every_room_is_known_to_who_looks_for_sources():
 
 
 def test_files_beside_a_script_do_not_shadow_the_program(tmp_path):
-    for name in ROOM_FOLDERS:
+    for name in rooms(REPOSITORY):
         (tmp_path / f"{name}.py").write_text("raise ImportError('taken from beside the script')\n")
     (tmp_path / "script.py").write_text(
         "import palpate as pp\n"
