@@ -95,7 +95,7 @@ def test_missing_and_truncated_files_are_named(tmp_path):
     written(tmp_path)
     whole = gzip.compress("\n".join([HEADER, *ROWS * 500]).encode())
     (tmp_path / "rec.csv.gz").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(RecordingError, match="whole"):
+    with pytest.raises(RecordingError, match="truncated"):
         read_recording(tmp_path / "rec.csv.gz")
 
 

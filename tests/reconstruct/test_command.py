@@ -68,7 +68,7 @@ def test_a_truncated_archive_is_found(files, tmp_path, capsys):
     whole = gzip.compress(files[0].read_bytes(), compresslevel=1)
     samples.write_bytes(whole[: len(whole) // 2])
     (tmp_path / "bad.toml").write_text(files[1].read_text())
-    assert "is not whole" in refused(samples, tmp_path, capsys)
+    assert "is truncated" in refused(samples, tmp_path, capsys)
 
 
 def test_a_missing_description_is_found(files, tmp_path, capsys):

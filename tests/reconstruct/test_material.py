@@ -142,7 +142,7 @@ def test_what_is_no_test_or_two_kinds_is_one_line(tmp_path, capsys):
     assert cli.main(["material", *map(str, files), "--json", str(tmp_path / "out.json")]) == 0
     held = json.loads((tmp_path / "out.json").read_text())
     assert held["kind"] == "compression" and held["relative_error"]["neo-hookean"] < 0.02
-    assert "no fit has seen" in capsys.readouterr().out
+    assert "held-out" in capsys.readouterr().out
 
 
 def test_measured_data_are_read_by_their_own_headers(measured_data):

@@ -91,4 +91,4 @@ def test_what_stands_at_its_bound_is_in_the_first_line_and_fails_only_where_it_c
     beaten = dataclasses.replace(made, error=error)
     assert beaten.predicts and "kelvin-voigt predicts held-out data better" in beaten.lines()[0]
     closed = dataclasses.replace(made, closed=1.02, closed_ci95=(0.9, 1.1))
-    assert "takes away 100 % of the gap (95 % sure: 90 to 100 %)" in "\n".join(closed.lines())
+    assert "100 % of the gap (95 % sure: 90 to 100 %)" in "\n".join(closed.lines())

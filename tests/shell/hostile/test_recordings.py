@@ -40,7 +40,7 @@ SAMPLES = {
     "ten times too large": (text_of(rows(scale=20)), "1.6 m across"),
     "inches": (text_of(rows(scale=1 / 0.0254)), "look like .*inches"),
     "not packed": (b"plain", "cannot be unpacked", ".csv.gz"),
-    "packed and cut off": (gzip.compress(text_of(rows()).encode())[:-30], "not whole", ".csv.gz"),
+    "packed and cut off": (gzip.compress(text_of(rows()).encode())[:-30], "truncated", ".csv.gz"),
     "a gzip bomb": (gzip.compress(bytes(20 << 20), 6), "no text of comma", ".csv.gz"),
     "a bomb with a header": (
         gzip.compress(f"{HEADER}\n".encode() + b"\n" * (8 << 20), 6),

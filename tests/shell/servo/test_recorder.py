@@ -52,7 +52,7 @@ def test_a_disk_that_fills_up_keeps_whole_rows_and_takes_the_rest_later(monkeypa
             recorder.collect()
             continue
         for _ in range(2):
-            with pytest.raises(RecordingError, match="finds no room"):
+            with pytest.raises(RecordingError, match="no room"):
                 recorder.collect()
         assert len(recorder.recording(0.005).t) == 20
     disk.room *= 2
