@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from platformdirs import user_cache_path
+
 from tools.goldens.cases import CASES, Case
 from tools.goldens.plain import Plain
 
@@ -27,6 +29,7 @@ class Measured:
     def __init__(self, python: Path, folder: Path, model: Path | None = None) -> None:
         self.python, self.folder = python, folder.resolve()
         self.folder.mkdir(parents=True, exist_ok=True)
+        self.cache = _own_cache(self.folder.with_name(f"{self.folder.name}-cache"))
         self.model = model
         places = {str(self.folder): "WORK", str(python.parent): "BIN", str(Path.home()): "HOME"}
         self.places, self.version = places, self.ask("facts")["version"]
@@ -105,11 +108,23 @@ class Measured:
         fixed = dict.fromkeys(_THREADS, "1") | {
             "COLUMNS": "80", "LC_ALL": "C.UTF-8", "TZ": "UTC", "PYTHONHASHSEED": "0", "MPLBACKEND": "Agg",
             "PYVISTA_OFF_SCREEN": "true", "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8",
+            "PALPATE_CACHE": str(self.cache),
         }  # fmt: skip
         return subprocess.run(
             [str(self.python), "-P", *words], cwd=place, env=kept | fixed, capture_output=True, text=True,
             encoding="utf-8", stdin=subprocess.DEVNULL, timeout=LONGEST_S,
         )  # fmt: skip
+
+
+def _own_cache(folder: Path) -> Path:
+    """A cache without models: `palpate demo` leaves one whose mesh is another than the shipped one's.
+    Compiled kernels are shared with the user's."""
+    users = Path(os.environ.get("PALPATE_CACHE") or user_cache_path("palpate", appauthor=False)).resolve()
+    (users / "kernels").mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    if not (folder / "kernels").exists():
+        (folder / "kernels").symlink_to(users / "kernels", target_is_directory=True)
+    return folder
 
 
 def _without(value: Any, keys: tuple[str, ...]) -> Any:

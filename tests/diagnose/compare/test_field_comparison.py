@@ -116,7 +116,7 @@ def test_a_1d_model_that_wins_is_in_the_first_line_with_floor_and_ceiling_below(
     assert not won.lines()[0].startswith("A 1D model")
     for result in (won, lost):
         noise, constant = 1e3 * result.noise_n, 1e3 * result.constant_n
-        assert f"the sensor's noise {noise:.0f} mN, a constant push" in result.lines()[-2]
+        assert f"the sensor's noise {noise:.0f} mN, a constant force" in result.lines()[-2]
         assert result.lines()[-2].endswith(f" {constant:.0f} mN")
     assert result.noise_n < won.rmse_n["fem"] < won.constant_n
 
