@@ -1,9 +1,7 @@
-"""What an object is made of, in typed parts. No mesh: what elements make of it stands in
-mechanics.model.material.
+"""What an object is made of, in typed parts, and the moduli of a mesh's elements that follow from them.
 
-The moduli of elements, derived from the parts of a material: always over the object's global modulus.
-
-Everything multiplies; what comes out at last is held within MODULUS_LIMITS.
+Moduli of elements are over the object's global modulus. Everything multiplies; what comes out at last is held
+within MODULUS_LIMITS.
 """
 
 from __future__ import annotations

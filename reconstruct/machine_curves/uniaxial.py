@@ -110,7 +110,7 @@ class Uniaxial:
 
 
 def of_compression(path: Path | str, specimen: str = "") -> Uniaxial:
-    """A cylinder between platens (reconstruct.machine_curves.uniaxial)."""
+    """A cylinder between platens."""
     test = read_compression(path)
     return Uniaxial(1 - test.strain, -test.stress, Path(path).stem, specimen)
 

@@ -47,6 +47,13 @@ Units = Annotated[
     option("units of the columns; kinds: position, force, time", metavar="KIND=UNIT,...", parse=_split),
 ]
 """In Python {kind: unit}."""
+ClockOfRows = Annotated[
+    str | None,
+    option(
+        "if time goes back: one clock, or blocks with a clock each", choices=("one", "blocks"), advanced=True
+    ),
+]
+"""Whether a log's times are of one clock."""
 
 
 def model_argument(words: str = "folder of a model, a scene, a surface file") -> Mapping[str, Any]:

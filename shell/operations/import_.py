@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from palpate.mechanics.errors import OptionError
 from palpate.operations._call import Call
 from palpate.operations._declare import argument, operation, option
-from palpate.operations._shared import SAMPLES, Units, columns_option, named, output_option
+from palpate.operations._shared import SAMPLES, ClockOfRows, Units, columns_option, named, output_option
 from palpate.operations._to_argparse import finite, vector
 
 if TYPE_CHECKING:
@@ -105,14 +105,7 @@ def import_table(
             advanced=True,
         ),
     ] = None,
-    clock: Annotated[
-        str | None,
-        option(
-            "if time goes back: one clock, or blocks with a clock each",
-            choices=("one", "blocks"),
-            advanced=True,
-        ),
-    ] = None,
+    clock: ClockOfRows = None,
     rate_hz: Annotated[
         float | None, option("rate to resample to, or rate of rows without a time", unit="Hz", advanced=True)
     ] = None,

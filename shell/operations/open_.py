@@ -17,7 +17,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 from palpate.mechanics.errors import OptionError
 from palpate.operations._call import Call
 from palpate.operations._declare import argument, operation, option
-from palpate.operations._shared import MODEL, Seed, Units, columns_option, named, report_option, save_option
+from palpate.operations._shared import (
+    MODEL,
+    ClockOfRows,
+    Seed,
+    Units,
+    columns_option,
+    named,
+    report_option,
+    save_option,
+)
 
 if TYPE_CHECKING:
     from palpate.importing.kinds import Opened
@@ -58,14 +67,7 @@ def open(
         str | None,
         option("sign of a machine's load as it presses", choices=("positive", "negative"), advanced=True),
     ] = None,
-    clock: Annotated[
-        str | None,
-        option(
-            "if time goes back: one clock, or blocks with a clock each",
-            choices=("one", "blocks"),
-            advanced=True,
-        ),
-    ] = None,
+    clock: ClockOfRows = None,
     slab_m: Annotated[
         float | None, option("thickness, if the object is a slab", unit="m", flag="--slab")
     ] = None,

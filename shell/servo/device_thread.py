@@ -1,14 +1,13 @@
-"""What the held force does to the hand: its work, booked by the side that holds it.
-
-Only the device's side knows what it held and for how long: ticks come late, are skipped, and a force may have
-expired meanwhile. So the work is summed here, reading by reading, and travels with each pose as one number.
-
-The device's side of the servo process: reads it just before each tick, sends the force just after.
+"""The device's side of the servo process: reads it just before each tick, sends the force just after.
 
 The loop never waits for this thread, nor for the interpreter's lock that it needs; poses and commands pass
 through two seqlocked blocks. A command comes with the time for which it may act: where no tick has come by
 then it sends zero, and zero is the last thing it sends, whatever ended it. A driver's own dead man's switch
-comes after this one. Each pose carries the work of what was held (palpate.servo.device_thread).
+comes after this one.
+
+Only this side knows which force it held and for how long: ticks come late, are skipped, and a force may have
+expired meanwhile. So the held force's work is summed here, reading by reading, and travels with each pose as
+one number.
 """
 
 from __future__ import annotations

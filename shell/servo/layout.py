@@ -1,12 +1,11 @@
 """The memory that the servo shares with its parent: named arrays in one block, and what their cells mean.
 
 Writers: the parent writes `control`; the servo's loop writes everything else. Blocks with a `_version` are
-read through palpate.servo.layout; the ring's rows are complete up to `ring_head`.
+read by a sequence lock; the ring's rows are complete up to `ring_head`.
 
-A block of numbers with one writer and any readers, without a lock: readers copy and look again.
-
-The writer makes the counter odd, writes, makes it even; a reader takes the copy where the counter was even
-and the same before and after. Fences keep compiler and processor from reordering (also on ARM).
+A sequence lock: a block of numbers with one writer and any readers, who copy and look again. The writer
+makes the counter odd, writes, makes it even; a reader takes the copy where the counter was even and the
+same before and after. Fences keep compiler and processor from reordering (also on ARM).
 """
 
 from __future__ import annotations
