@@ -16,6 +16,12 @@ import pyvista
 import palpate
 
 ROOT = Path(__file__).resolve().parents[1]
+INSTALLED = Path(palpate.__file__).parent
+if INSTALLED.name != "palpate":
+    raise SystemExit(
+        f"palpate is installed as editable, from {INSTALLED}, where its rooms do not have the names that their pages "
+        "say. Run: pip install '.[docs]'"
+    )
 sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 import _evidence  # noqa: E402
 import _reference  # noqa: E402
@@ -36,7 +42,7 @@ suppress_warnings = ["config.cache", "autoapi.python_import_resolution", "ref.py
 
 myst_heading_anchors = 4
 
-autoapi_dirs = [str(Path(palpate.__file__).parent)]  # the installed package, where rooms have their names
+autoapi_dirs = [str(INSTALLED)]
 autoapi_root = "reference/rooms"
 autoapi_options = ["members", "undoc-members", "show-module-summary"]
 autoapi_ignore = ["*/operations/*"]  # flags in signatures: the commands' pages say them
