@@ -3,7 +3,8 @@
 Recordings of a block by the mechanics that the diagnosis predicts with, so that nothing but the instrument
 and the second cause is in question: a hand that trembles presses twelve places, or slides to and fro at
 depth, in a device frame turned by chance. The reading follows the tip through a play on each axis of the
-device, and is rounded. What differs from place to place is left out of the library. Lengths m, forces N.
+device, jitters and is rounded. What differs from place to place is left out of the library. Lengths m,
+forces N.
 """
 
 from __future__ import annotations
@@ -34,8 +35,10 @@ from palpate.mechanics.recording.side_of_play import play
 from palpate.mechanics.shape.tetmesh import box_mesh
 
 MODULUS_PA, NU, TIP_M, RATE_HZ = 20e3, 0.49, 0.005, 500.0
-NOISE_N, TREMOR_M, TREMOR_HZ, STEP_M = 0.01, 25e-6, 9.0, 3e-5
+NOISE_N, TREMOR_M, TREMOR_HZ = 0.01, 25e-6, 9.0
 WIDTHS_M = (0.25e-3, 0.5e-3)
+STEPS_M, JITTERS_M = (5e-6, 6e-5), (0.0, 1e-5)
+"""Of the reading: how it is rounded, and its noise before that, rms."""
 AIR_S, TRAVEL_S = 0.6, 0.8
 WITHOUT = ",".join(e.name for e in effects() if e.scope is Scope.PLACES or e.hints.expensive)
 MOTIONS = ("press", "slide", "both")
@@ -66,8 +69,8 @@ class Case:
 
 def cases(alone: int, pairs: int, seed: int) -> list[Case]:
     """Plays by themselves on every motion in turn, every second one of a neo-Hookean block; pairs with each
-    second cause in turn, sliding where friction is to be felt; and each second cause without a play. Mixed,
-    so that what was done is a fair sample."""
+    second cause in turn, sliding where friction is to be felt; each second cause without a play, and as many
+    controls as plays alone. Mixed, so that what was done is a fair sample."""
     found = [Case(seed + i, MOTIONS[i % 3], finite=i % 2 == 1) for i in range(alone)]
     names = list(SECOND)
     for i in range(pairs):
@@ -75,6 +78,7 @@ def cases(alone: int, pairs: int, seed: int) -> list[Case]:
         motion = ("slide", "both")[i // 3 % 2] if name == SLIP.name else MOTIONS[i // 3 % 3]
         found.append(Case(seed + 1000 + i, motion, name, finite=i % 2 == 1))
     found += [Case(seed + 2000 + i, "both", name, play=False) for i, name in enumerate(names)]
+    found += [Case(seed + 3000 + i, MOTIONS[i % 3], play=False, finite=i % 2 == 1) for i in range(alone)]
     return [found[i] for i in np.random.default_rng(seed).permutation(len(found))]
 
 
@@ -106,8 +110,11 @@ def recorded(case: Case) -> tuple[Recording, Model]:
         read = np.empty_like(tip)
         width = float(rng.uniform(*WIDTHS_M))
         play(np.array([0, len(tip)]), np.ascontiguousarray(tip), np.zeros((1, 3)), width, read)
+    reader = np.random.default_rng([case.seed, 1])
+    step, jitter = np.exp(reader.uniform(*np.log(STEPS_M))), reader.uniform(*JITTERS_M)
+    read = read + jitter * reader.normal(size=read.shape)
     recording = Recording(
-        t=t, position=np.round(read / STEP_M) * STEP_M,
+        t=t, position=np.round(read / step) * step,
         force_on_tool=force + rng.normal(0, NOISE_N, force.shape),
         sample_rate_hz=RATE_HZ, tip_radius_m=TIP_M, poisson_ratio=NU,
     )  # fmt: skip
@@ -203,6 +210,7 @@ def _rates(rows: list[dict[str, Any]]) -> dict[str, tuple[int, int]]:
     alone = [r for r in rows if r["true"] == [PLAY.name]]
     pairs = [r for r in rows if PLAY.name in r["true"] and len(r["true"]) == 2]
     without = [r for r in rows if PLAY.name not in r["true"]]
+    controls = [r for r in rows if not r["true"]]
     finite = [r for r in alone + pairs if r["finite"]]
     return {
         "play first, alone": (sum(r["named"][:1] == [PLAY.name] for r in alone), len(alone)),
@@ -210,5 +218,6 @@ def _rates(rows: list[dict[str, Any]]) -> dict[str, tuple[int, int]]:
         "both of a pair, and nothing else": (sum(sorted(r["named"]) == r["true"] for r in pairs), len(pairs)),
         "both of a pair named": (sum(set(r["true"]) <= set(r["named"]) for r in pairs), len(pairs)),
         "play named without one": (sum(PLAY.name in r["named"] for r in without), len(without)),
+        "anything named of a control": (sum(bool(r["named"]) for r in controls), len(controls)),
         "finite strain named of a neo-Hookean block": (sum(r["strain_named"] for r in finite), len(finite)),
     }
