@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 
 def spaced(name: str) -> str:
@@ -44,6 +45,12 @@ def sentence(text: str) -> str:
 def counted(number: int, thing: str) -> str:
     """'1 curve', '3 curves'."""
     return f"{number} {thing}{'s' * (number != 1)}"
+
+
+def signed(words: str, value: Any) -> tuple[str, int]:
+    """(words, 1), or where words say how late something is and the value is below 0, ('... early by', -1)."""
+    early = isinstance(value, int | float) and value < 0 and " late " in f" {words} "
+    return (words.replace("late", "early"), -1) if early else (words, 1)
 
 
 def with_unit(value: float, unit: str, scale: float = 1.0, digits: int = 4) -> str:

@@ -115,6 +115,18 @@ class Attribution:
     finite_strain_closes: float
     confidence_set_p: dict[str, float]
 
+    @property
+    def scored(self) -> dict[str, tuple[Score, float]]:
+        """{name: (score, p value of the confidence set)} of the first step; what only a later one tried, as
+        another law of a phenomenon, with that step's, where it was chosen."""
+        later = {
+            name: (step[name], confidence_set_p(step)[name])
+            for step in reversed(self.steps[1:])
+            for name in self.chosen
+            if name in step
+        }
+        return later | {name: (score, self.confidence_set_p[name]) for name, score in self.scores.items()}
+
 
 def attribute(
     search: Search,

@@ -202,7 +202,7 @@ def entries_of(
     offsets, strain = findings.instrument_offsets, search.finite_strain
     noise, added = findings.noise_n, forward.touches.thinned_away
     draws = max(100, findings.bootstrap // 4)
-    limits = detectable(search, found.base, [s.effect for s in found.scores.values()])
+    limits = detectable(search, found.base, [score.effect for score, _ in found.scored.values()])
 
     def sure(name: str, scored: float = 1.0) -> float:
         return sureness(name, how_named(name, answer.names, answer.candidates, answer.kind), scored)
@@ -211,15 +211,18 @@ def entries_of(
         return closed_share_ci95(gaps.before, plain, counts, noise**2 - added, rng, draws)
 
     entries = []
-    for name, score in found.scores.items():
+    for name, (score, p) in found.scored.items():
         own = score.effect
-        closed, interval = closed_by(score.candidate.plain, draws)
+        alone = score.candidate
+        if name not in found.scores:
+            alone = search.judge([*found.base.found.effects, own], like=found.base)
+        closed, interval = closed_by(alone.plain, draws)
         fitted = found.final.found if name in found.chosen else score.candidate.found
         entries.append(
             EffectEntry(
-                name, own.domain, sure(name, score.probability), gap(score.candidate.plain, counts, added),
+                name, own.domain, sure(name, score.probability), gap(alone.plain, counts, added),
                 closed, interval, own.report(fitted.of(name), forward, fitted.modulus), score.gain,
-                parameter_intervals(fitted, name, forward, search.dof, rng), found.confidence_set_p[name],
+                parameter_intervals(fitted, name, forward, search.dof, rng), p,
                 limits.get(name, float("nan")),
             )
         )  # fmt: skip

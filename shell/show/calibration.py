@@ -9,7 +9,7 @@ import numpy as np
 from palpate.mechanics.quantities import fitting_unit
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.show.story import Detail, Headline, Story
-from palpate.words import sure, with_unit
+from palpate.words import signed, sure, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,6 +31,8 @@ def story(result: Calibration) -> Story:
         value, between = getattr(result, key), result.interval.get(key)
         if value is not None:
             unit, scale = fitting_unit(key, value)
+            words, sign = signed(words, value)
+            scale, between = sign * scale, between and between[::sign]
             within = "" if between is None else f" ({sure(*(f'{scale * end:.4g}' for end in between))})"
             yield Detail(f"{words}: {with_unit(value, unit, scale)}{within}")
     if result.matrix is not None:

@@ -16,12 +16,14 @@ from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import DiagnoseOptions, NuisanceOptions
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.answer import answer_of
-from palpate.diagnosis.verdict.held_out import held_out_by_refit
+from palpate.diagnosis.verdict.conclusion import entries_of
+from palpate.diagnosis.verdict.held_out import held_out_by_refit, held_out_gaps
 from palpate.diagnosis.verdict.next_touch import next_touch
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.presses.gap_bins import gap_by_bin
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.show.demo import diagnosis_json, diagnosis_words
+from palpate.show.diagnosis.parameters import parameter_rows, short
 from palpate.show.diagnosis.words import verdict
 from palpate.words import spoken
 
@@ -75,6 +77,33 @@ def test_delay_is_named_measured_and_taken_off(delayed):
     assert improved(model, result)[1] == []
     again = diagnose(corrected(recording, result), model, FAST)
     assert "time_delay" not in again.effects
+
+
+def test_what_only_a_later_step_tried_has_its_numbers_too(delayed):
+    findings = delayed[2].findings
+    first = dict(findings.found.scores)
+    later = {"time_delay": first.pop("time_delay")}
+    found = dataclasses.replace(
+        findings.found,
+        scores=first,
+        steps=(first, later),
+        confidence_set_p={n: p for n, p in findings.found.confidence_set_p.items() if n in first},
+    )
+    findings = dataclasses.replace(findings, found=found)
+    counts = findings.search.whitener.counts()
+    gaps, rng = held_out_gaps(findings), np.random.default_rng(0)
+    entry = entries_of(findings, answer_of(findings, counts), gaps, counts, rng)[0]
+    assert entry.name == "time_delay" and entry.parameters["delay_s"] == pytest.approx(0.02, abs=0.002)
+    assert entry.gap_closed == pytest.approx(delayed[2].entries[0].gap_closed, abs=0.02)
+
+
+def test_a_delay_below_zero_is_early(delayed):
+    entry = dataclasses.replace(
+        delayed[2].entries[0], parameters={"delay_s": -5e-3}, intervals={"delay_s": [-6e-3, -4e-3]}
+    )
+    result = dataclasses.replace(delayed[2], entries=(entry,))
+    assert parameter_rows(result) == [["time delay", "force reads early by", "5", "4 to 6", "ms"]]
+    assert short(entry.parameters) == "force reads early by 5 ms"
 
 
 def test_memory_is_named_and_goes_into_the_model(bench, tmp_path):

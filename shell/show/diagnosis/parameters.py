@@ -9,7 +9,7 @@ from typing import Any
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.quantities import fitting_unit, quantity_words, split_key
 from palpate.mechanics.quantities import number_words as number
-from palpate.words import spaced
+from palpate.words import signed, spaced
 
 WORDS = {
     "mu": "friction coefficient",
@@ -63,10 +63,11 @@ def plain_key(key: str, value: Any = None) -> tuple[str, float, str]:
 
 def short(parameters: Mapping[str, Any], words: Mapping[str, str] = MappingProxyType({})) -> str:
     """Parameters in one line. words: of keys that are called something else here."""
-    return ", ".join(
-        f"{words.get(key) or plain_key(key)[0]} {quantity_words(key, value)}"
-        for key, value in parameters.items()
-    )
+    said = []
+    for key, value in parameters.items():
+        name, sign = signed(words.get(key) or plain_key(key)[0], value)
+        said.append(f"{name} {quantity_words(key, value if sign > 0 else -value)}")
+    return ", ".join(said)
 
 
 def parameter_rows(result: Diagnosis) -> list[list[str]]:
@@ -76,6 +77,9 @@ def parameter_rows(result: Diagnosis) -> list[list[str]]:
         for key, value in entry.parameters.items() if entry.name in result.effects else ():
             words, factor, unit = plain_key(key, value)
             low, high = entry.intervals.get(key, (None, None))
+            words, sign = signed(words, value)
+            if sign < 0:
+                value, low, high = -value, None if high is None else -high, None if low is None else -low
             for k, (one, least, most) in enumerate(_each(key, value, low, high)):
                 span = "-" if least is None else f"{number(least, factor)} to {number(most, factor)}"
                 said = f"{words} ({_ORDINALS[k]})" if one is not value else words
