@@ -19,8 +19,8 @@ ROOT = Path(__file__).resolve().parents[1]
 INSTALLED = Path(palpate.__file__).parent
 if INSTALLED.name != "palpate":
     raise SystemExit(
-        f"palpate is installed as editable, from {INSTALLED}, where its rooms do not have the names that their pages "
-        "say. Run: pip install '.[docs]'"
+        f"palpate is installed as editable, from {INSTALLED}, where its rooms have not the names that their "
+        "pages say. Run: pip install '.[docs]'"
     )
 sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 import _evidence  # noqa: E402

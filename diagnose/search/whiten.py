@@ -104,6 +104,17 @@ class Whitener:
             out[i] = (part.T @ part - side.T @ side / self.variance) / self.variance
         return out
 
+    def drawn(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """(n, 3, count) N, residuals drawn from the covariance; 0 at rows that do not count."""
+        out = np.zeros((len(self.louder), 3, count))
+        for block in self.blocks:
+            nuisances = np.tril(block.factor[0]) @ block.halved
+            sizes = (len(nuisances), count)
+            noise = np.sqrt(self.variance) * rng.normal(size=(3 * len(block.rows), count))
+            noise += nuisances.T @ rng.normal(size=sizes)
+            out[block.rows] = noise.reshape(-1, 3, count) * self.louder[block.rows][:, None, None]
+        return out
+
     def raw_gram(self, x: np.ndarray) -> np.ndarray:
         """(g, k, k) plain inner products, N^2 where x is in N: for gaps."""
         k = x.shape[2]

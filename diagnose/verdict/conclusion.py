@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from palpate.diagnosis.search.evidence import detectable
 from palpate.diagnosis.search.fit import parameter_intervals
-from palpate.diagnosis.search.gaps import closed_share, closed_share_ci95, gap
+from palpate.diagnosis.search.gaps import closed_share, closed_share_ci95, gap, modulus_share
+from palpate.diagnosis.search.limits import detectable
 from palpate.diagnosis.search.rivals import alike
 from palpate.diagnosis.search.site_stiffness import repeat_scatter
 from palpate.diagnosis.verdict.answer import Answer, Findings, answer_of, stated_gap
@@ -210,6 +210,13 @@ def entries_of(
     def closed_by(plain: np.ndarray, draws: int) -> tuple[float | None, tuple[float, float] | None]:
         return closed_share_ci95(gaps.before, plain, counts, noise**2 - added, rng, draws)
 
+    counted = forward.touches.counted
+    plain = (forward.touches.local_force - found.base.residual)[counted]
+
+    def felt(change: np.ndarray) -> float:
+        own = change[counted] - modulus_share(change[counted], plain) * plain
+        return float(np.sqrt((own**2).sum(axis=1).mean()))
+
     entries = []
     for name, (score, p) in found.scored.items():
         own = score.effect
@@ -223,7 +230,7 @@ def entries_of(
                 name, own.domain, sure(name, score.probability), gap(alone.plain, counts, added),
                 closed, interval, own.report(fitted.of(name), forward, fitted.modulus), score.gain,
                 parameter_intervals(fitted, name, forward, search.dof, rng), p,
-                limits.get(name, float("nan")),
+                limits.get(name, float("nan")), felt(alone.residual - found.base.residual),
             )
         )  # fmt: skip
     if found.finite_strain_gain > -search.options.beyond_doubt or strain.name in answer.names:
@@ -232,7 +239,7 @@ def entries_of(
         entries.append(
             EffectEntry(
                 strain.name, strain.domain, sure(strain.name), left, closed, interval, {},
-                found.finite_strain_gain,
+                found.finite_strain_gain, size_n=felt(found.deep.residual - found.ideal.residual),
             )
         )  # fmt: skip
     for name in offsets.names:

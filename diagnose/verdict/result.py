@@ -42,7 +42,8 @@ class EffectEntry:
 
     intervals: [low, high] of each parameter at 95 %. confidence_set_p: p value of the model confidence set
     (nan where it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
-    detectable_n: N rms of its force from which these presses show it at all (nan: unknown).
+    detectable_n: N rms of its force from which 19 of 20 draws of such presses name it (inf: at no size; nan:
+    unknown). size_n: N rms of what it changes, the best common factor taken off.
     """
 
     name: str
@@ -56,6 +57,12 @@ class EffectEntry:
     intervals: dict[str, Any] = field(default_factory=dict)
     confidence_set_p: float = float("nan")
     detectable_n: float = float("nan")
+    size_n: float = float("nan")
+
+    @property
+    def odds(self) -> float:
+        """That it is there, against that it is not."""
+        return self.probability / (1 - self.probability) if self.probability < 1 else float("inf")
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys; null where a number is not known."""
@@ -71,8 +78,10 @@ class EffectEntry:
         return {
             **{name: _plain(getattr(self, name)) for name in names},
             "parameters_ci95": self.intervals,
-            "confidence_set_p": self.confidence_set_p if np.isfinite(self.confidence_set_p) else None,
-            "detectable_n": self.detectable_n if np.isfinite(self.detectable_n) else None,
+            **{
+                name: value if np.isfinite(value := getattr(self, name)) else None
+                for name in ("odds", "confidence_set_p", "detectable_n", "size_n")
+            },
         }
 
 

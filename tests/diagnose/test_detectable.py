@@ -1,6 +1,9 @@
-"""From which size on an effect shows, whatever the decision."""
+"""From which size on an effect is named."""
 
 from __future__ import annotations
+
+import copy
+import dataclasses
 
 import numpy as np
 import pytest
@@ -8,43 +11,70 @@ import pytest
 from palpate.diagnosis.forward.prediction import build_forward
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
-from palpate.diagnosis.search.evidence import SEEN, Search, detectable
+from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
+from palpate.diagnosis.search.limits import DRAWS, Patterns, detectable
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.model import Model
+
+
+def search_of(model, presses) -> Search:
+    return Search(
+        build_forward(touches_of(presses), model), 20e3, nuisance=NuisanceOptions(),
+        options=AttributionOptions(), site_sd=None, finite_strain=effect("finite_strain"),
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def judged(bench):
     """(search, the plain fit) of presses with nothing in them."""
-    recording, model = bench.record()
-    forward = build_forward(touches_of(model.presses), model)
-    search = Search(
-        forward, 20e3, nuisance=NuisanceOptions(), options=AttributionOptions(), site_sd=None,
-        finite_strain=effect("finite_strain"),
-    )  # fmt: skip
+    _, model = bench.record()
+    search = search_of(model, model.presses)
     return search, search.judge([effect("finite_strain")])
 
 
-def test_an_effect_as_large_as_its_limit_stands_out_by_as_much(judged):
+def test_an_effect_of_its_limit_is_named_and_one_of_a_third_is_not(judged):
+    tried = [effect("time_delay"), effect("viscoelasticity"), effect("tip_radius")]
+    limits = detectable(*judged, tried)
+    patterns = Patterns(*judged, tried, True, seed=5)
+    for number, own in enumerate(tried):
+        form = np.flatnonzero(patterns.own == number)[np.zeros(DRAWS, dtype=int)]
+        shares = [
+            patterns.named(number, form, np.full(DRAWS, times * limits[own.name])).mean()
+            for times in (2, 1 / 3)
+        ]
+        assert shares[0] > 0.9 > 0.5 > shares[1]
+
+
+def test_what_inner_products_score_is_what_the_search_scores_of_the_same_residual(judged):
+    """A delay, whose force is nearly linear in it."""
     search, base = judged
     delay = effect("time_delay")
-    limit = detectable(search, base, [delay])["time_delay"]
-    found = base.found
+    patterns = Patterns(search, base, [delay], True, seed=5)
+    found, forward = base.found, search.forward
+    force = forward.predict(settings_of(forward, found.effects, found.values, found.onset))
+    size_n = 1.5 * detectable(search, base, [delay])["time_delay"]
+    force += size_n / patterns.size[0] * patterns.columns[:, :, 1]
+    force += search.whitener.drawn(DRAWS, np.random.default_rng(5))[:, :, 0]
+    own = search_on_force(search, force)
+    old, new = own.judge([search.finite_strain]), own.judge([search.finite_strain, delay])
+    score = own.score([delay], new, old)
+    column, factor = np.ones(DRAWS, dtype=int), np.full(DRAWS, size_n / patterns.size[0])
+    white, plain = (p.with_column(column, factor) for p in (patterns.white, patterns.plain))
+    linear = patterns.scored(0, white, plain, white.gains())
+    assert linear.gain[0] == pytest.approx(score.gain, rel=0.2)
+    assert linear.odds[0] == pytest.approx(score.log_odds, abs=1.0)
 
-    def change(seconds: float) -> np.ndarray:
-        settings = settings_of(search.forward, found.effects, found.values, found.onset)
-        before = search.forward.predict(settings)
-        delay.act(settings, np.array([seconds]), search.forward)
-        return search.forward.predict(settings) - before
 
-    counted = search.forward.touches.counted
-    size = np.sqrt((change(0.01)[counted] ** 2).sum(axis=1).mean())
-    seconds = 0.01 * limit / size
-    pair = np.stack([found.jacobian[:, :, 0], change(seconds)], axis=2)
-    gram = search.whitener.gram(pair).sum(axis=0)
-    left = gram[1, 1] - gram[0, 1] ** 2 / gram[0, 0]
-    assert np.sqrt(left / search.forward.touches.noise.variance_inflation) == pytest.approx(SEEN, rel=0.15)
+def search_on_force(search: Search, force: np.ndarray) -> Search:
+    """The same search on other forces (n, 3) N, local frame."""
+    forward = copy.copy(search.forward)
+    t = forward.touches
+    forward.touches = dataclasses.replace(t, force=np.einsum("nji,nj->ni", t.frame[t.press], force))
+    return Search(
+        forward, 20e3, nuisance=NuisanceOptions(), options=AttributionOptions(), site_sd=None,
+        finite_strain=effect("finite_strain"),
+    )  # fmt: skip
 
 
 def test_a_spring_in_the_tool_hides_behind_modulus_and_first_touch_as_a_delay_does_not(judged):

@@ -167,7 +167,7 @@ CASES: tuple[Case, ...] = (
     Case("reconstruct", (f"reconstruct {REC} -o out --json out.json --report out.html",), near=MESHED),
     Case("reconstruct-paper", (f"reconstruct {REC} -o out --method paper --json out.json",),
          near={"young_modulus_pa": 0.05}),
-    Case("model", ("model ../inputs/box.stl --modulus 20000 -o out --json out.json",), near=MESHED),
+    Case("model-of-file", ("model ../inputs/box.stl --modulus 20000 -o out --json out.json",), near=MESHED),
     Case("simulate", ("simulate cylinder --protocol brief -o rec.csv.gz --seed 3 --effect time_delay=1 "
                       "--no-sizes --workers 1 --json rec.json",)),
     Case("explore", ("explore --phantom cylinder --most 6 -o rec.csv.gz --json rec.json",)),

@@ -108,9 +108,8 @@ def answers(result: Diagnosis) -> list[tuple[str, str, str]]:
 def how_sure(result: Diagnosis) -> tuple[str, str, str]:
     question = "How sure is it?"
     if result.kind == "none":
-        return question, "As sure as these touches are", (
-            "Smaller effects than the noise may be there; deeper, faster or longer touches would show them."
-        )  # fmt: skip
+        smaller = "Smaller ones may be there; deeper, faster or longer touches would show them."
+        return question, "Larger effects would have been named", f"{begun(limits(result))}. {smaller}"
     if result.candidates:
         also = "; ".join(f"{spaced(n)}: {meaning(n)}" for n in result.candidates)
         text = f"Not ruled out: {also}. The touch proposed below would decide it."
@@ -130,6 +129,17 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
         return question, f"{percent(sure[least])} sure", text
     each = ", ".join(f"{spaced(name)} {percent(share)}" for name, share in sure.items())
     return question, begun(each), text
+
+
+def limits(result: Diagnosis) -> str:
+    """From which size on each effect would have been named, the smallest first, and what never would."""
+    known = {e.name: e.detectable_n for e in result.entries if not np.isnan(e.detectable_n)}
+    never = [name for name, limit in known.items() if np.isinf(limit)]
+    ranked = sorted((n for n in known if n not in never), key=lambda n: known[n])
+    from_size = listed(f"{spaced(n)} from {force_words(known[n])}" for n in ranked)
+    said = [f"named in 19 of 20 such recordings would be {from_size}"] if ranked else []
+    said += [f"at no size {spoken(never)}"] if never else []
+    return "; ".join(said)
 
 
 def where(result: Diagnosis) -> tuple[str, str, str]:
