@@ -1,8 +1,9 @@
 """Is the stated limit of each effect true? Draws at 1, 2 and 4 times it, judged by the whole search.
 
-Residuals are drawn from the covariance of a recording's comparison with its model, an effect's own change of
-the force is added at so many times its `detectable_n`, and all effects are fitted and judged anew, as a
-diagnosis does it. Counted is the share of the draws that name it; and, without an effect, that name anything.
+The presses of a recording are made anew by the mechanics: first touches, stiffnesses of places and all other
+nuisances drawn from their widths, an effect at so many times its `detectable_n`, noise. All effects are
+fitted and judged anew, as a diagnosis does it. Counted is the share of the draws that name the effect, or
+another law of its phenomenon; and, without one, that name anything.
 """
 
 from __future__ import annotations
@@ -20,10 +21,15 @@ from benchmarks.timing import table
 from palpate.diagnosis.options import DiagnoseOptions
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.search.attribution import attribute
+from palpate.diagnosis.search.descent import misfit_of
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.limits import Patterns, detectable
+from palpate.diagnosis.search.gaps import modulus_share
+from palpate.diagnosis.search.limits import detectable, forms_of
+from palpate.diagnosis.search.rivals import of_one_phenomenon
+from palpate.diagnosis.search.whiten import nuisance_columns
 from palpate.diagnosis.verdict.answer import Findings
+from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.files import read_model
 from palpate.mechanics.recording.recording import read_recording
@@ -52,39 +58,77 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     tried = [s.effect for s, _ in found.found.scored.values()]
     limits = detectable(found.search, found.found.base, tried)
     names = arguments.effects or [n for n, limit in limits.items() if np.isfinite(limit)]
-    patterns = Patterns(found.search, found.found.base, tried, model.fitted_to(found.forward.touches), 0)
     rng = np.random.default_rng(arguments.seed)
     counted: dict[str, tuple[int, int]] = {}
     for name in names:
-        own = np.flatnonzero(patterns.own == next(i for i, e in enumerate(tried) if e.name == name))
+        own = effect(name)
+        forms = forms_of(found.search, own)
         for times in TIMES:
-            hits = 0
+            hits = made = 0
             for draw in range(arguments.draws):
-                column = own[draw % len(own)]
-                change = times * limits[name] / patterns.size[column] * patterns.columns[:, :, 1 + column]
-                hits += name in _named(found, tried, change, rng)
-            counted[f"{name} named at {times:g} times {1e3 * limits[name]:.3g} mN"] = (hits, arguments.draws)
-            print(
-                f"{name:22s} {times:g} x {1e3 * limits[name]:6.1f} mN: {hits} of {arguments.draws}",
-                flush=True,
-            )
-    nothing = np.zeros_like(patterns.columns[:, :, 0])
-    named = [_named(found, tried, nothing, rng) for _ in range(arguments.controls)]
+                values = _of_size(found, own, forms[draw % len(forms)], times * limits[name])
+                if values is None:
+                    continue  # no such effect is as large
+                named = [effect(n) for n in _named(found, tried, own, values, rng)]
+                hits += own in named or of_one_phenomenon(own, named)
+                made += 1
+            counted[f"{name} named at {times:g} times {1e3 * limits[name]:.3g} mN"] = (hits, made)
+            print(f"{name:22s} {times:g} x {1e3 * limits[name]:6.1f} mN: {hits} of {made}", flush=True)
+    named = [_named(found, tried, None, None, rng) for _ in range(arguments.controls)]
     counted["anything named without an effect"] = (sum(map(bool, named)), len(named))
     print(table(["rate", "hits", "of"], [[what, *pair] for what, pair in counted.items()]))
     return {"limits_n": limits, "figures": rates(counted)}
 
 
-def _named(found: Findings, tried: list[Any], change: np.ndarray, rng: np.random.Generator) -> set[str]:
-    """What the search names of a draw with a change (n, 3) N of the force in it."""
-    base, t = found.found.base.found, found.forward.touches
-    settings = settings_of(found.forward, base.effects, base.values, base.onset)
-    force = found.forward.predict(settings) + change + found.search.whitener.drawn(1, rng)[:, :, 0]
+def _of_size(found: Findings, own: Effect, form: np.ndarray, size_n: float) -> np.ndarray | None:
+    """Values (k,) between none of an effect and its bounds, towards a form, whose change of the force is of
+    that rms, N; None where none is."""
+    base, forward = found.found.base.found, found.forward
+    counted = forward.touches.counted
+    before = forward.predict(settings_of(forward, base.effects, base.values, base.onset))
+
+    def size(share: float) -> float:
+        settings = settings_of(forward, base.effects, base.values, base.onset)
+        own.act(settings, np.clip(own.ideal + share * (form - own.ideal), *own.bounds), forward)
+        change = (np.nan_to_num(forward.predict(settings)) - before)[counted]
+        change -= modulus_share(change, before[counted]) * before[counted]
+        return float(np.sqrt((change**2).sum(axis=1).mean()))
+
+    low, high = 0.0, 1.0
+    while size(high) < size_n:
+        low, high = high, 2 * high
+        if high > 64:
+            return None
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if size(middle) < size_n else (low, middle)
+    return np.clip(own.ideal + high * (form - own.ideal), *own.bounds)
+
+
+def _named(
+    found: Findings, tried: list[Effect], own: Effect | None, values: Any, rng: np.random.Generator
+) -> tuple[str, ...]:
+    """What the search names of one draw with an effect of these values (k,) in it."""
+    base, t, whitener = found.found.base.found, found.forward.touches, found.search.whitener
+    onset = base.onset + whitener.onset_sd * rng.normal(size=len(t))
+    settings = settings_of(found.forward, base.effects, base.values, onset)
+    if own is not None:
+        own.act(settings, values, found.forward)
+    force = np.nan_to_num(found.forward.predict(settings))
+    columns = nuisance_columns(
+        found.forward, settings, force.copy(), found.search.nuisance, found.site_sd, whitener.onset_sd
+    )
+    for level, column in columns[1:]:  # the first is the first touch's
+        drawn = rng.normal(size=len(t))[t.press if level == "press" else t.site[t.press]]
+        force += drawn[:, None] * column
+    force += (np.sqrt(whitener.variance) * whitener.louder)[:, None] * rng.normal(size=force.shape)
     forward = copy.copy(found.forward)
     forward.touches = dataclasses.replace(t, force=np.einsum("nji,nj->ni", t.frame[t.press], force))
     search = Search(
         forward, base.modulus, nuisance=found.search.nuisance, options=found.search.options,
         site_sd=found.site_sd, finite_strain=effect("finite_strain"),
     )  # fmt: skip
-    search.starts = found.search.starts
-    return set(attribute(search, tried).chosen)
+    fitted = search.judge([search.finite_strain])
+    misfit = misfit_of(forward, fitted.found, found.site_sd)
+    search.starts = {e.name: e.hints.seek(forward, misfit) for e in tried if e.hints.seek is not None}
+    return attribute(search, tried).chosen

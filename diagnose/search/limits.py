@@ -69,7 +69,7 @@ class Patterns:
         before = np.nan_to_num(forward.predict(settings))
         columns, own, size = [found.jacobian[:, :, 0]], [], []
         for number, effect in enumerate(effects):
-            for form in _forms(search, effect):
+            for form in forms_of(search, effect):
                 settings = settings_of(forward, found.effects, found.values, found.onset)
                 effect.act(settings, form, forward)
                 change = np.nan_to_num(forward.predict(settings)) - before
@@ -278,7 +278,7 @@ def _without_first_touches(search: Search, change: np.ndarray) -> np.ndarray:
     return change - moved[t.press][:, None] * column
 
 
-def _forms(search: Search, effect: Effect) -> list[np.ndarray]:
+def forms_of(search: Search, effect: Effect) -> list[np.ndarray]:
     """Values (k,) at which an effect is there: some of its starts, or a move of each parameter where it
     starts from nothing."""
     starts = search.starts.get(effect.name) or effect.starts()

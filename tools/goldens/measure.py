@@ -118,12 +118,14 @@ class Measured:
 
 def _own_cache(folder: Path) -> Path:
     """A cache without models: `palpate demo` leaves one whose mesh is another than the shipped one's.
-    Compiled kernels are shared with the user's."""
+    Compiled kernels are shared with the user's, and the laboratory's meshes: the mesher makes another each
+    time."""
     users = Path(os.environ.get("PALPATE_CACHE") or user_cache_path("palpate", appauthor=False)).resolve()
-    (users / "kernels").mkdir(parents=True, exist_ok=True)
     folder.mkdir(parents=True, exist_ok=True)
-    if not (folder / "kernels").exists():
-        (folder / "kernels").symlink_to(users / "kernels", target_is_directory=True)
+    for shared in ("kernels", "laboratory"):
+        (users / shared).mkdir(parents=True, exist_ok=True)
+        if not (folder / shared).exists():
+            (folder / shared).symlink_to(users / shared, target_is_directory=True)
     return folder
 
 
