@@ -14,7 +14,7 @@ from palpate.diagnosis.explore.estimate import ExplorationEstimate, updated
 from palpate.diagnosis.explore.explorer import Suggestion
 from palpate.diagnosis.explore.segments import join
 from palpate.diagnosis.explore.weighing import Weighing, weigh
-from palpate.diagnosis.search.evidence import SEEN
+from palpate.diagnosis.search.limits import SEEN
 from palpate.mechanics.errors import SceneError
 from palpate.robot import LaboratoryRobot
 from palpate.scenes.laboratory.curves import ALONE

@@ -21,8 +21,9 @@ from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.other_simulator.declared_parameters import StatedForward
 from palpate.diagnosis.search.attribution import Attribution, attribute
 from palpate.diagnosis.search.descent import Descent
-from palpate.diagnosis.search.evidence import SEEN, Search
+from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit, parameter_intervals, settings_of
+from palpate.diagnosis.search.limits import SEEN
 from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours, never_worse
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects

@@ -170,7 +170,8 @@ CASES: tuple[Case, ...] = (
     Case("model-of-file", ("model ../inputs/box.stl --modulus 20000 -o out --json out.json",), near=MESHED),
     Case("simulate", ("simulate cylinder --protocol brief -o rec.csv.gz --seed 3 --effect time_delay=1 "
                       "--no-sizes --workers 1 --json rec.json",)),
-    Case("explore", ("explore --phantom cylinder --most 6 -o rec.csv.gz --json rec.json",)),
+    Case("explore", ("explore --phantom cylinder --most 6 -o rec.csv.gz --json rec.json",), near=MESHED,
+         without=("update_s",)),
     Case("touch", ("touch demo --headless --seconds 1 --seed 3 --record rec.csv.gz --json touch.json",),
          near=TIMED, without=("stdout", "reasons")),
     Case("batch", (f"batch {REC} -o out --do reconstruct --no-reports --workers 1 --json batch.json",),
