@@ -45,7 +45,8 @@ class Curve(Result):
     tool.
 
     Depth is travel along -n since first touch, 0 before it. normal: (3,) outward at first touch; renderer,
-    tip_radius_m: what it was pressed with; None for a curve that was read. exact: the place as it was solved,
+    tip_radius_m: what it was pressed with; None for a curve that was read. unsettled: samples whose force did
+    not settle, and that hold the one before. exact: the place as it was solved,
     where the force is by that. `plot`: force along the normal,
     and its length, over depth. `show`: the object as it is deformed at the deepest, with tip and force.
     """
@@ -58,6 +59,7 @@ class Curve(Result):
     renderer: Renderer | None = None
     tip_radius_m: float | None = None
     exact: SolvedPlace | None = None
+    unsettled: int = 0
 
     @cached_property
     def error_figures(self) -> dict[str, float]:
@@ -172,7 +174,8 @@ def press(
     state = scene.start([radius], dt_s=step_s)
     force = scene.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), step_s))
     depth = np.maximum(along * steepness, 0.0)
-    return Curve(t, position, depth, force[:, 0], normal, scene.renderer, radius)
+    unsettled = int(state.touch.unsettled[0])
+    return Curve(t, position, depth, force[:, 0], normal, scene.renderer, radius, unsettled=unsettled)
 
 
 def solved(curve: Curve, exact: ExactPlaces) -> Curve:

@@ -46,6 +46,11 @@ def counted(number: int, thing: str) -> str:
     return f"{number} {thing}{'s' * (number != 1)}"
 
 
+def unsettled_words(unsettled: int, of: int) -> str:
+    """Of forces that did not settle."""
+    return f"{unsettled} of {counted(of, 'force')} did not settle: the one before was held"
+
+
 def with_unit(value: float, unit: str, scale: float = 1.0, digits: int = 4) -> str:
     """A number with its unit for people: `with_unit(0.0123, "mm", 1e3)` is '12.3 mm'."""
     return f"{value * scale:.{digits}g} {unit}"
