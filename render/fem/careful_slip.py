@@ -21,7 +21,7 @@ SETTLED, _INSIDE = 1e-4, 1e-3
 SLIP_U, SLIP_V, RIM_U, RIM_V = 9, 10, 11, 12
 """Cells of `state.trial` after those of `felt_here`: the tangential force without what the rim of the base
 takes up, and the direction into it where it takes up some."""
-_CARE_WALKS, _FOLLOW_WALKS = 10, 30
+_ROUNDS, _CARE_WALKS, _FOLLOW_WALKS, _TURNS = 3, 8, 20, 6
 _CAUTION, _BETTER, _SHORTER, _SHORTENED = 0.98, 0.9, 0.5, 8
 _PROBE, _FIRST, _LONGEST = 2e-4, 0.01, 0.25  # walks, in tip radii
 
@@ -175,6 +175,16 @@ def _aim(p, state, tips, i, bu, bv):
 @inner
 def slip_with_care(p, state, tips, i):
     """Walk tip i's anchor on from where it was kept; whether the force in `state.trial` has settled."""
+    for _ in range(_ROUNDS):
+        if _walk_to_cone(p, state, tips, i) or _slip_off(p, state, tips, i):
+            return True
+    _try(p, state, tips, i, 0.0, 0.0)
+    return False
+
+
+@inner
+def _walk_to_cone(p, state, tips, i):
+    """Walk to where the rates say that the force is on the cone, as long as that brings it nearer."""
     mu, radius, trial = p.friction[0], state.radii_m[i], state.trial
     excess, pull = _try(p, state, tips, i, 0.0, 0.0)
     for _ in range(_CARE_WALKS):
@@ -201,16 +211,17 @@ def slip_with_care(p, state, tips, i):
             share *= _SHORTER
         if not better:
             break
-    return _slip_off(p, state, tips, i)
+    return False
 
 
 @inner
 def _slip_off(p, state, tips, i):
-    """Follow the anchor of tip i along the pull; whether it holds again, or has let go."""
+    """Follow the anchor of tip i along the pull to about where that turns; whether it holds or lets go."""
     mu, radius, trial = p.friction[0], state.radii_m[i], state.trial
     excess, pull = _try(p, state, tips, i, 0.0, 0.0)
     stride = _FIRST * radius
     fu, fv = trial[SLIP_U] / pull, trial[SLIP_V] / pull
+    turned = 0
     for _ in range(_FOLLOW_WALKS):
         excess, pull = _try(p, state, tips, i, stride * fu, stride * fv)
         push = trial[0]
@@ -219,8 +230,11 @@ def _slip_off(p, state, tips, i):
         if excess > 0.0 and trial[SLIP_U] * fu + trial[SLIP_V] * fv > 0.0:
             fu, fv = trial[SLIP_U] / pull, trial[SLIP_V] / pull
             keep_anchor(state, i)
-            stride = min(1.5 * stride, _LONGEST * radius)
+            if turned == 0:
+                stride = min(1.5 * stride, _LONGEST * radius)
         else:
+            turned += 1
             stride *= _SHORTER
-    _try(p, state, tips, i, 0.0, 0.0)
+        if turned == _TURNS:
+            break
     return False

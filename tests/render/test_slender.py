@@ -107,14 +107,14 @@ def jumps(renderer, path: np.ndarray) -> tuple[np.ndarray, int]:
 def test_the_force_on_a_slender_body_never_jumps(tentacle, mu, paths):
     renderer = tentacle.with_friction(mu)
     stiffest = (
-        4 * MODULUS * TIP
-    )  # of the dent alone, 2 E* a with a contact half as wide as the tip, and half more
+        4 * MODULUS / (1 - POISSON**2) * TIP
+    )  # twice the dent's, 2 E* a, with a contact as wide as the tip
     unsettled = 0
     for seed in range(paths):
         changes, missed = jumps(renderer, drawn(renderer, seed, 1000))
         assert changes.max() < stiffest
         unsettled += missed
-    assert unsettled < 1e-3 * paths * 1000
+    assert unsettled < 3e-3 * paths * 1000
 
 
 def test_a_force_that_does_not_settle_is_the_last_one_and_is_counted_and_told(beam):
