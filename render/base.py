@@ -28,6 +28,7 @@ class State(NamedTuple):
     points: (m, 3) the material point of the undeformed surface that holds the tip; normals: (m, 3) outward
     there. depths: (m,) m, -n . (tip - point - R n). stiffness: (m,) N/m, change of the normal force with
     depth, 0 in air. radii_m: (m,). dt_s: (1,) time that a step covers; only terms with memory read it.
+    unsettled: (1,) int64, steps so far in which a tip's force did not settle and its last one was held.
     """
 
     forces: np.ndarray
@@ -38,6 +39,7 @@ class State(NamedTuple):
     stiffness: np.ndarray
     radii_m: np.ndarray
     dt_s: np.ndarray
+    unsettled: np.ndarray
 
 
 def new_state(radii_m: np.ndarray, dt_s: float) -> State:
@@ -52,6 +54,7 @@ def new_state(radii_m: np.ndarray, dt_s: float) -> State:
         stiffness=np.zeros(m),
         radii_m=radii_m.copy(),
         dt_s=np.array([dt_s]),
+        unsettled=np.zeros(1, dtype=np.int64),
     )
 
 

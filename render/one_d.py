@@ -53,6 +53,7 @@ class OneDState(NamedTuple):
     stiffness: np.ndarray
     radii_m: np.ndarray
     dt_s: np.ndarray
+    unsettled: np.ndarray
     grip: Grip
     rate: np.ndarray
     before: np.ndarray

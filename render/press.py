@@ -24,6 +24,7 @@ from palpate.render.base import Renderer
 from palpate.render.force_error import error_figures, force_errors
 from palpate.render.scene import TouchScene, scene_of
 from palpate.render.surface.bvh import STACK, closest_triangle
+from palpate.render.surface.contact import CLEAR, outside
 from palpate.render.surface.contact_surface import SurfaceArrays
 from palpate.render.surface.walking import foot
 
@@ -45,7 +46,8 @@ class Curve(Result):
     tool.
 
     Depth is travel along -n since first touch, 0 before it. normal: (3,) outward at first touch; renderer,
-    tip_radius_m: what it was pressed with; None for a curve that was read. exact: the place as it was solved,
+    tip_radius_m: what it was pressed with; None for a curve that was read. unsettled: samples whose force did
+    not settle, and that hold the one before. exact: the place as it was solved,
     where the force is by that. `plot`: force along the normal,
     and its length, over depth. `show`: the object as it is deformed at the deepest, with tip and force.
     """
@@ -58,6 +60,7 @@ class Curve(Result):
     renderer: Renderer | None = None
     tip_radius_m: float | None = None
     exact: SolvedPlace | None = None
+    unsettled: int = 0
 
     @cached_property
     def error_figures(self) -> dict[str, float]:
@@ -141,8 +144,8 @@ def press(
     """Press along `direction` (3,) with the tip's centre aimed at the point `at` (3,) m, device frame.
 
     touched: a scene, or a renderer, which stands on its model's support. Raises OptionError where the line
-    misses both, enters the object through its base, or grazes what it meets (more than 80 degrees off the
-    normal).
+    misses both, enters the object through its base, grazes what it meets (more than 80 degrees off the
+    normal), or starts inside the object or under the support.
     """
     scene = scene_of(touched)
     at, direction = np.asarray(at, dtype=float), np.asarray(direction, dtype=float)
@@ -168,11 +171,38 @@ def press(
         )
     t, along = stroke.samples(steepness)
     position = touch + along[:, None] * direction
+    check_start(scene, position[0], touch, radius)
     step_s = 1.0 / stroke.rate_hz
     state = scene.start([radius], dt_s=step_s)
     force = scene.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), step_s))
     depth = np.maximum(along * steepness, 0.0)
-    return Curve(t, position, depth, force[:, 0], normal, scene.renderer, radius)
+    unsettled = int(state.touch.unsettled[0])
+    return Curve(t, position, depth, force[:, 0], normal, scene.renderer, radius, unsettled=unsettled)
+
+
+def check_start(scene: TouchScene, start: np.ndarray, touch: np.ndarray, radius: float) -> None:
+    """Raise OptionError where the tip's centre starts, at (3,) m, in the object or under the support.
+
+    touch: (3,) m, the centre at first touch. A tip that starts beside the foot may graze the support.
+    """
+    surface, plane = scene.renderer.contact.arrays, scene.support
+    weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
+    triangle, distance = closest_triangle(
+        surface.bvh, surface.vertices, surface.triangles, start, np.inf, weights, stack
+    )
+    there = f"the press would start at {np.round(start, 6).tolist()} m, "
+    meets = f"along this direction its centre is at {np.round(touch, 6).tolist()} m as it meets the surface: "
+    if distance <= radius + CLEAR or not outside(surface, triangle, weights, start):
+        raise OptionError(
+            f"{there}where a tip of radius {radius:g} m is in the object; {meets}approach through less free "
+            "air (--approach), or press from another side"
+        )
+    height = float((start - plane.point) @ plane.normal)
+    if plane.stiffness_n_per_m > 0 and height <= 0:
+        raise OptionError(
+            f"{there}{-height:.4g} m under the support; {meets}aim at least {radius:g} m above it, or "
+            "leave it out (--no-support)"
+        )
 
 
 def solved(curve: Curve, exact: ExactPlaces) -> Curve:

@@ -37,13 +37,15 @@ def replay(
     *,
     tip_radius_m: float | None = None,
     progress: Progress = silent,
+    unsettled: Callable[[int], None] | None = None,
 ) -> np.ndarray:
     """Force on the tool (n, 3) N for a path of one tip: t (n,) s increasing, positions (n, 3) m of its
     centre.
 
     touched: a scene, or a renderer, which stands on its model's support. The tip starts in air: one that
     begins inside the object is not touched until it has come out. tip_radius_m: None takes the model's.
-    Bit-identical from run to run. Raises OptionError where the shapes disagree.
+    unsettled: told how many samples' force did not settle, and hold the one before. Bit-identical from run to
+    run. Raises OptionError where the shapes disagree.
     """
     scene = scene_of(touched)
     t = np.ascontiguousarray(t, dtype=float)
@@ -57,16 +59,20 @@ def replay(
         part = slice(first, first + _CHUNK)
         forces[part] = scene.follow(state, positions[part, None], steps[part])[:, 0]
         progress("replay", min(first + _CHUNK, len(t)) / len(t))
+    if unsettled is not None:
+        unsettled(int(state.touch.unsettled[0]))
     return forces
 
 
 def replay_recording(
-    touched: Renderer | TouchScene, recording: Recording, progress: Progress = silent
+    touched: Renderer | TouchScene,
+    recording: Recording,
+    progress: Progress = silent,
+    unsettled: Callable[[int], None] | None = None,
 ) -> np.ndarray:
     """`replay` of a recording's path with the recording's tip."""
-    return replay(
-        touched, recording.t, recording.position, tip_radius_m=recording.tip_radius_m, progress=progress
-    )
+    path, radius = recording.position, recording.tip_radius_m
+    return replay(touched, recording.t, path, tip_radius_m=radius, progress=progress, unsettled=unsettled)
 
 
 def replay_touches(
@@ -155,7 +161,8 @@ class ReplayResult(Result, ReplayError):
     """Forces of a renderer along a recorded path, against those measured.
 
     t: (n,) s. force_n: (n, 3) N rendered, on the tool, device frame. used: the renderer itself. exact: the
-    touched places as they were solved, where the forces are by that. `plot`: both forces over time. `show`:
+    touched places as they were solved, where the forces are by that. unsettled: samples whose force did not
+    settle, and that hold the one before. `plot`: both forces over time. `show`:
     the object, each touch coloured by its rms error.
     """
 
@@ -166,6 +173,7 @@ class ReplayResult(Result, ReplayError):
     force_n: np.ndarray
     used: Renderer | None = None
     exact: ExactReplay | None = None
+    unsettled: int = 0
 
     @property
     def error_n(self) -> np.ndarray:

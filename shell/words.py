@@ -53,6 +53,11 @@ def signed(words: str, value: Any) -> tuple[str, int]:
     return (words.replace("late", "early"), -1) if early else (words, 1)
 
 
+def unsettled_words(unsettled: int, of: int) -> str:
+    """Of forces that did not settle."""
+    return f"{unsettled} of {counted(of, 'force')} did not settle: the one before was held"
+
+
 def with_unit(value: float, unit: str, scale: float = 1.0, digits: int = 4) -> str:
     """A number with its unit for people: `with_unit(0.0123, "mm", 1e3)` is '12.3 mm'."""
     return f"{value * scale:.{digits}g} {unit}"

@@ -61,10 +61,10 @@ def integrate(start, y, far, radius, bend, e_dent, e_far, nu, table, tool_compli
                 )
                 state[1] = dent  # where the next solution starts from
                 pull = np.sqrt(fu * fu + fv * fv)
-                excess, kept = slip_excess(slip, pull, fn, mu)
-                fu *= kept
-                fv *= kept
-                if excess == 0.0:
+                excess, kept = slip_excess(pull, fn, mu)
+                if excess == 0.0 or slip == SLIPS - 1:
+                    fu *= kept
+                    fv *= kept
                     break
                 both = 1.0 / (stick * a) + 0.5 * (compliance[1, 1] + compliance[2, 2])
                 length = slip_length(slip, excess, before, length, both, 1.0)

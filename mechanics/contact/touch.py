@@ -30,6 +30,7 @@ from palpate.mechanics.kernels import kernel
 
 _STIFFEST = 0.8  # of a contact's own compliance, the most that a near support may take away
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
+_SLOW = 24  # turns after which the dent is sought by secants
 STATE_SIZE = 4 + 3 * _RINGS
 """state[0]: rings held; [1]: dent along -n, m; [2:4]: tangential dent, m; then (radius, cumulated origin)."""
 
@@ -73,8 +74,8 @@ def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
     bu = free_u + stick * (cuu * mu + cuv * mv)
     bv = free_v + stick * (cuv * mu + cvv * mv)
     m00, m01, m11 = max(1.0 + k * cuu, 1.0 - _STIFFEST), k * cuv, max(1.0 + k * cvv, 1.0 - _STIFFEST)
-    if m01 * m01 > _STIFFEST * m00 * m11:
-        m01 = 0.0
+    if m01 * m01 > _STIFFEST * m00 * m11 and not (cuu >= 0.0 and cuv * cuv <= cuu * cvv):
+        m01 = 0.0  # what gives way against a force could turn it unstable; a slender body's own never does
     det = m00 * m11 - m01 * m01
     du = (m11 * bu - m01 * bv) / det
     dv = (m00 * bv - m01 * bu) / det
@@ -125,8 +126,13 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
     low, high = 0.0, (press + np.sqrt(d[1] * d[1] + d[2] * d[2])) / (1.0 - _STIFFEST)
     dent = state[1] if 0.0 < state[1] < high else 0.5 * press
     tolerance = 1e-10 * radius
+    # a compliance that is positive definite as it is needs no limit
+    minor = cuu * cvv - cuv * cuv
+    within = cvv * far[1, 0] ** 2 - 2.0 * cuv * far[1, 0] * far[2, 0] + cuu * far[2, 0] ** 2
+    sound = cuu > 0.0 and minor > 0.0 and cnn * minor >= within
     fn = fu = fv = a = du = dv = stiffness = compliance = 0.0
-    for _ in range(80):
+    last_dent = last_excess = 0.0
+    for turn in range(80):
         fn, stiffness, a = dent_force(table, dent, radius, bend, plane_strain_modulus)
         # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
         # that
@@ -136,7 +142,7 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
         couple = cun * cun + cvn * cvn
         held = stick * a
         least = (1.0 / stiffness + compliance) * (1.0 / held + max(min(cuu, cvv), -_STIFFEST / held))
-        if couple > _STIFFEST * least:
+        if couple > _STIFFEST * least and not sound:
             cun *= np.sqrt(_STIFFEST * least / couple)
             cvn *= np.sqrt(_STIFFEST * least / couple)
         # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
@@ -146,7 +152,13 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
             high = dent
         else:
             low = dent
-        step = -excess / (1.0 + compliance * stiffness)
+        slope = 1.0 + compliance * stiffness
+        if turn > _SLOW:  # a slender body's coupling takes up most of that slope
+            secant = (excess - last_excess) / (dent - last_dent)
+            if secant > 0.0:
+                slope = secant
+        last_dent, last_excess = dent, excess
+        step = -excess / slope
         if abs(step) < tolerance:
             break
         dent += step

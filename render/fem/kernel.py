@@ -10,7 +10,8 @@ F the forces on the object. The dent and its stick are mechanics.contact.touch, 
 reconstruction fits. C_far is interpolated over the fine contact surface, C between contacts over the mesh's
 surface nodes: a step costs the same for any number of nodes. Forces are found by Gauss-Seidel over the
 contacts, where one that the others no longer move is not solved again; where the tangential force exceeds
-Coulomb's mu F_n, the anchor p_i walks over the surface until it does not (stick and slip).
+Coulomb's mu F_n, the anchor p_i walks over the surface until it does not (stick and slip). A force that has
+not settled is not rendered: the last one is held, and the tick is counted.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ from palpate.mechanics.contact.dent import dent_load
 from palpate.mechanics.contact.touch import touch_remember
 from palpate.mechanics.effects.laws_along_path import sharp_laws, smooth_laws
 from palpate.mechanics.kernels import part, step_kernel
+from palpate.render.fem.careful_slip import settle
 from palpate.render.fem.held_tips import carry_all, leave, link, locate, new_frame, renew
-from palpate.render.fem.stick_slip import settle, solve_one, unsettled
+from palpate.render.fem.stick_slip import solve_one, unsettled
 from palpate.render.surface.contact import approach, lose, release, strayed
 from palpate.render.surface.walking import foot
 
@@ -31,7 +33,7 @@ from palpate.render.surface.walking import foot
 def forget(state, i):
     """A new touch of tip i remembers nothing of the last one (what the material felt stays in `felt`)."""
     for k in range(4):
-        state.memory[i, k] = 0.0
+        state.memory[i, k] = state.solution[i, k] = 0.0
     state.deepest[i] = 0.0
     for law in range(state.remembered.shape[1]):
         for k in range(state.remembered.shape[2]):
@@ -44,7 +46,8 @@ def conclude(p, state, tips, i):
     grip, out, normal = state.grip, state.solution[i], state.normals[i]
     pressed = out[0] > 0.0
     if pressed:
-        touch_remember(state.memory[i], out[3], out[4], out[5], out[6], state.radius[i])
+        if state.held[i] == 0:
+            touch_remember(state.memory[i], out[3], out[4], out[5], out[6], state.radius[i])
         depth = state.radii_m[i]
         for k in range(3):
             depth -= normal[k] * (tips[i, k] - state.points[i, k])
@@ -157,6 +160,9 @@ def fem_step(p, state, tips):
                 settled = False
         if held == 1 or settled:
             break
+    held_back = 0
     for i in range(m):
         if grip.triangle[i] >= 0:
+            held_back = max(held_back, state.held[i])
             conclude(p, state, tips, i)
+    state.unsettled[0] += held_back

@@ -55,7 +55,8 @@ class FemState(NamedTuple):
     pairs j < i; mixed (m, 3, r) the factor at each tip; links (m, 3, 3, m) m/N, [j, c, k, i] the displacement
     of tip i's place along k for a unit force on the object at tip j along c; carried (3, m) m, by how
     much the others move each place, with the sign turned, and carried_before that of its last
-    solution; edition of the table. The others are scratch.
+    solution; edition of the table; held (m,) int64, 1 where a tip's force did not settle in this tick. The
+    others are scratch.
     """
 
     forces: np.ndarray
@@ -66,6 +67,7 @@ class FemState(NamedTuple):
     stiffness: np.ndarray
     radii_m: np.ndarray
     dt_s: np.ndarray
+    unsettled: np.ndarray
     grip: Grip
     frames: np.ndarray
     elastic: np.ndarray
@@ -89,6 +91,12 @@ class FemState(NamedTuple):
     curvature: np.ndarray
     bend: np.ndarray
     young: np.ndarray
+    held: np.ndarray
+    base: np.ndarray
+    base_triangle: np.ndarray
+    base_force: np.ndarray
+    fall: np.ndarray
+    trial: np.ndarray
     vectors: np.ndarray
     stack: np.ndarray
 
@@ -121,6 +129,12 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         curvature=np.zeros(m),
         bend=np.zeros(m),
         young=np.zeros(m),
+        held=np.zeros(m, dtype=np.int64),
+        base=np.zeros((4, 3)),
+        base_triangle=np.zeros(1, dtype=np.int64),
+        base_force=np.zeros(3),
+        fall=np.zeros((2, 3)),
+        trial=np.zeros(13),
         vectors=np.zeros((6, 3)),
         stack=np.zeros(STACK, dtype=np.int64),
     )

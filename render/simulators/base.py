@@ -231,6 +231,7 @@ class SimulatedState(NamedTuple):
     stiffness: np.ndarray
     radii_m: np.ndarray
     dt_s: np.ndarray
+    unsettled: np.ndarray
     world: list[World | None]
 
 
@@ -248,7 +249,7 @@ class SimulatorRenderer(Renderer):
         m = len(radii)
         return SimulatedState(
             np.zeros((m, 3)), np.zeros(m, dtype=np.int64), np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m),
-            np.zeros(m), radii.copy(), np.array([dt_s]), [None] * m,
+            np.zeros(m), radii.copy(), np.array([dt_s]), np.zeros(1, dtype=np.int64), [None] * m,
         )  # fmt: skip
 
     def step(self, state: SimulatedState, tips: np.ndarray) -> tuple[SimulatedState, np.ndarray]:

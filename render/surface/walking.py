@@ -129,6 +129,34 @@ def walk(surface, triangle, weights, move):
     return triangle
 
 
+@inner
+def rim_across(surface, triangle, weights, across):
+    """Write the unit direction (3,), in the triangle's plane, that leads from an anchor on the rim into the
+    base, where `walk` stops; zeros where the anchor is not on it."""
+    for k in range(3):
+        across[k] = 0.0
+    for c in range(3):
+        edge = (c + 1) % 3
+        other = surface.neighbours[triangle, edge]
+        if weights[c] > 1e-9 or not (other < 0 or surface.free[other] == 0):
+            continue
+        top = surface.triangles[triangle, c]
+        start, end = surface.triangles[triangle, edge], surface.triangles[triangle, (edge + 1) % 3]
+        along = length = 0.0
+        for k in range(3):
+            e = surface.vertices[end, k] - surface.vertices[start, k]
+            along += (surface.vertices[top, k] - surface.vertices[start, k]) * e
+            length += e * e
+        size = 0.0
+        for k in range(3):
+            e = surface.vertices[end, k] - surface.vertices[start, k]
+            across[k] = surface.vertices[start, k] + along / length * e - surface.vertices[top, k]
+            size += across[k] * across[k]
+        size = np.sqrt(size)
+        for k in range(3):
+            across[k] /= size
+
+
 @kernel
 def foot(surface, triangle, weights, tip, point, normal, move):
     """Walk the anchor to where the contact normal points at the tip: no tangential offset is left.

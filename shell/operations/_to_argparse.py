@@ -21,6 +21,8 @@ _DEFAULT = re.compile(r" *\(default: ([^()]*(?:\([^()]*\)[^()]*)*)\)")
 _UNIT = re.compile(r" *\[([^\[\]]{1,9})\](?=$| \()")
 _NONE = re.compile(r"[;,] (?:None:|default:|'' for|'' means|'' keeps) (.*)$")
 _SAID = {"": "", "None": "", "True": "yes", "False": "no"}
+_NEGATIVE = re.compile(r"-(\.?\d|inf|[xyz](,|$))", re.IGNORECASE)
+"""A number, numbers or an axis, and no option."""
 _TYPES: dict[str, Callable[[str], Any]] = {"int": int, "float": float, "str": str}
 _METAVARS = {"int": "INTEGER", "float": "NUMBER"}
 
@@ -75,7 +77,21 @@ class OneLineParser(argparse.ArgumentParser):
                 if word.startswith("--") and not any(each.startswith(flag) for each in flags):
                     like = near(flag, flags)
                     self.error(f"'{flag}' is not an option" + (f"; did you mean {like[0]}?" if like else ""))
+            words = self._with_their_values(words)
         return super().parse_args(words, namespace)
+
+    def _with_their_values(self, words: list[str]) -> list[str]:
+        """Options joined to values that begin with a minus, which argparse takes for options of their own."""
+        takers = [flag for action in self._actions if action.nargs is None for flag in action.option_strings]
+        joined: list[str] = []
+        for word in words:
+            last = joined[-1] if joined else ""
+            asks = last in takers or (len(last) > 2 and any(flag.startswith(last) for flag in takers))
+            if "--" not in joined and last.startswith("--") and asks and _NEGATIVE.match(word):
+                joined[-1] = f"{last}={word}"
+            else:
+                joined.append(word)
+        return joined
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:

@@ -68,7 +68,8 @@ def replay(
     with call.progress("replay") as show_progress:
         scene = make(show_progress)
         check_near(measured, scene.model)
-        forces = replay_recording(scene, measured, show_progress)
+        counted: list[int] = []
+        forces = replay_recording(scene, measured, show_progress, counted.append)
     presses, solved = _touched(measured, scene.model), None
     if exact:
         places = ExactPlaces(scene.renderer, measured.tip_radius_m)
@@ -89,6 +90,7 @@ def replay(
         force_n=forces,
         used=scene.renderer,
         exact=solved,
+        unsettled=sum(counted),
     )
     call.then_save(result, output)
     return result

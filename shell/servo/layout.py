@@ -33,9 +33,9 @@ STOP, ENABLE, BEAT = range(3)
 """Cells of `control`: STOP not 0 ends the loop; ENABLE: 0 for force off, else the number of the enabling;
 BEAT: the parent's heartbeat, counted up for as long as it lives and runs."""
 
-TICKS, MISSED, LATE, CONTACT_TICKS, DEADLINE, STARTED, STATUS = range(7)
+TICKS, MISSED, LATE, CONTACT_TICKS, DEADLINE, STARTED, STATUS, UNSETTLED = range(8)
 """Cells of `counts` (int64): ticks run, deadlines skipped, ticks started late, ticks in contact, the next
-deadline (ns), the first deadline (ns), and whether the loop runs."""
+deadline (ns), the first deadline (ns), whether the loop runs, and ticks whose force did not settle."""
 
 TIP_WIDTH = 15
 HEAD_WIDTH = 32

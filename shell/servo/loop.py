@@ -17,7 +17,7 @@ from numba import njit, typeof, types
 from palpate.mechanics.kernels import kept, loop_kernel, pointer, step_type
 from palpate.render.scene import TouchScene
 from palpate.servo.clock import COMPILED, c_function, compiled_now_ns, compiled_sleep_until, sleep_until
-from palpate.servo.layout import DEADLINE, STATUS, STOP
+from palpate.servo.layout import DEADLINE, STATUS, STOP, UNSETTLED
 from palpate.servo.tick import TickArrays, TickParameters, account, after, before
 
 _write = c_function("write", types.intp(types.int32, types.voidptr, types.uintp))
@@ -36,7 +36,9 @@ def one_tick(kernel, model, state, support, arrays, parameters, now_ns, deadline
 @njit(inline="always", nogil=True)
 def answer(kernel, model, state, support, arrays, parameters, now_ns, deadline_ns):
     """The tick once its pose is taken; now_ns: not before that."""
+    unsettled = state.unsettled[0]
     kernel(model, state, arrays.tips)
+    arrays.shared.counts[UNSETTLED] += state.unsettled[0] - unsettled
     after(
         arrays,
         parameters,

@@ -20,16 +20,19 @@ from palpate.servo.layout import (
     ROW_WIDTH,
     TICKS,
     TIP_WIDTH,
+    UNSETTLED,
     SharedArrays,
     read_copy,
 )
+from palpate.words import unsettled_words
 
 
 @dataclass(frozen=True)
 class ServoReport:
     """SI; the histograms' summaries in microseconds.
 
-    late_ticks: started more than the options' `late_s` after their deadline; missed_ticks: never run.
+    late_ticks: started more than the options' `late_s` after their deadline; missed_ticks: never run;
+    unsettled_ticks: the force did not settle, and the last one was held.
     energy_given_back_j: most that the hand ever got back net, energy_damped_j: what the controller took.
     reasons: ticks on which the safety filter gave each reason. words: what the system did not permit.
     """
@@ -50,6 +53,7 @@ class ServoReport:
     words: tuple[str, ...] = ()
     cpu_s: float = float("nan")
     wall_s: float = float("nan")
+    unsettled_ticks: int = 0
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -81,6 +85,8 @@ class ServoReport:
             f"it begins {late['median']:.0f} µs after its time, 999 of 1000 within {late['p99.9']:.0f}, all "
             f"within {late['max']:.0f}",
         ]
+        if self.unsettled_ticks:
+            lines.append(unsettled_words(self.unsettled_ticks, self.ticks))
         return "\n".join([*lines, *self.words])
 
 
@@ -116,6 +122,7 @@ def report(
         words=words,
         cpu_s=cpu_s,
         wall_s=wall_s,
+        unsettled_ticks=int(counts[UNSETTLED]),
     )
 
 

@@ -13,7 +13,7 @@ from palpate.render.force_error import said
 from palpate.render.press import Curve
 from palpate.show import story as say
 from palpate.show.page import file_words
-from palpate.words import kpa, mm
+from palpate.words import kpa, mm, unsettled_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,6 +39,8 @@ def story(result: Curve, written: str | None = None) -> say.Story:
         f"the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s; the object's "
         f"Young's modulus is {kpa(made.material.young_modulus_pa, '.4g')}"
     )
+    if result.unsettled:
+        yield say.Sentence(unsettled_words(result.unsettled, len(result.t)))
     if words := said(result.error_figures):
         yield say.Detail(words)
     if result.exact is not None:
@@ -70,6 +72,7 @@ KEYS: tuple[say.Key, ...] = (
     ("depth_m", lambda result: result.depth.max()),
     ("force_at_depth_n", lambda result: result.force_at(float(result.depth.max()))),
     "peak_force_n",
+    lambda result: {"unsettled_samples": result.unsettled} if result.unsettled else {},
     lambda result: result.error_figures,
     lambda result: {} if result.exact is None else {"exact": result.exact},
 )

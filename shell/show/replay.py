@@ -12,7 +12,7 @@ from palpate.show import story as say
 from palpate.show.curve import solved_rows
 from palpate.show.page import file_words
 from palpate.show.quantities import ERROR
-from palpate.words import mn
+from palpate.words import mn, unsettled_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,6 +31,8 @@ def story(result: ReplayResult) -> say.Story:
         f"{100 * result.relative:.3g} % of the measured {result.force_rms_n:.3g} N{noise}"
     )
     yield say.Detail(f"root mean square over {int(result.contact.sum())} samples in contact")
+    if result.unsettled:
+        yield say.Sentence(unsettled_words(result.unsettled, len(result.t)))
     if words := said(result.error_figures):
         yield say.Detail(words)
     if result.exact is not None:
@@ -63,6 +65,7 @@ KEYS: tuple[say.Key, ...] = (
     "force_rms_n",
     "relative_rmse=relative",
     ("peak_force_n", lambda result: np.linalg.norm(result.force_n, axis=1).max()),
+    lambda result: {"unsettled_samples": result.unsettled} if result.unsettled else {},
     lambda result: result.error_figures,
     _exact,
     lambda result: {} if result.noise_n is None else {"noise_n": result.noise_n},

@@ -12,6 +12,7 @@ from palpate.mechanics.contact.touch import (
     moduli,
     touch_force,
     touch_forces,
+    touch_solve,
     touch_step,
 )
 from palpate.mechanics.frames import local_frames, support_axes, tangents
@@ -146,3 +147,23 @@ def test_local_frame_is_right_handed_and_its_normal_first():
     assert np.array_equal(frame[0], normal) and axes[2] == pytest.approx(normal, abs=1e-15)
     assert np.array_equal(frame[1:], tangents(normal))
     assert axes[:2] == pytest.approx(frame[1:], abs=1e-15)
+
+
+@pytest.mark.parametrize("bend", [0.3, 0.95, 0.999])
+def test_a_body_that_gives_along_itself_as_it_bends_has_one_force_whatever_was_tried_before(bend):
+    # of the tip of a tentacle: most of what it gives along its axis is coupled to what it gives across
+    cnn, czz = 100.0, 20.0
+    far = np.array([[cnn, 0.0, bend * np.sqrt(cnn * czz)], [0, cnn, 0], [bend * np.sqrt(cnn * czz), 0, czz]])
+    turned = np.array([[1.0, 0, 0], [0, np.sqrt(0.5), -np.sqrt(0.5)], [0, np.sqrt(0.5), np.sqrt(0.5)]])
+    table, moduli_pa = dent_law("linear", 0.49).table, moduli(5e3, 0.49)
+    d = np.array([-2e-3, 0.0, 1e-4])
+    forces = []
+    for frame in (np.eye(3), turned):
+        for tried in (0.0, 1e-6, 1e-4, 2e-3):
+            state = np.zeros(STATE_SIZE)
+            state[1] = tried
+            fn, fu, fv = touch_solve(state, frame @ d, frame @ far @ frame.T, table, 0.005, 0.0, *moduli_pa)[
+                :3
+            ]
+            forces.append(frame.T @ [fn, fu, fv])
+    assert np.ptp(forces, axis=0) == pytest.approx(0.0, abs=1e-6 * np.abs(forces).max())

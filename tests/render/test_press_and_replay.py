@@ -12,8 +12,9 @@ from palpate.cli import main
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.presses.segmentation import FoundPresses, segment_recording
 from palpate.mechanics.recording.recording import Recording
-from palpate.render.press import Stroke, greatest_difference, press, read_curve, write_curve
+from palpate.render.press import Stroke, check_start, greatest_difference, press, read_curve, write_curve
 from palpate.render.replay import replay, replay_error, replay_touches
+from palpate.render.scene import in_the_air
 
 TIP = 0.005
 
@@ -141,3 +142,17 @@ def test_fem_predicts_the_left_out_top_and_the_1d_models_do_not(shared_recording
     assert result["rmse_n"]["fem"] < 0.3 * min(
         result["rmse_n"]["kelvin-voigt"], result["rmse_n"]["hunt-crossley"]
     )
+
+
+def test_a_press_starts_free_or_is_refused(block_renderer):
+    side = np.array([-1.0, 0.0, 0.0])
+    low = np.array([0.0, 0.0, -0.001])
+    with pytest.raises(OptionError, match="support"):
+        press(block_renderer, low, side, Stroke(1e-3, 0.02))
+    foot = np.array([0.0, 0.0, 0.003])
+    assert press(in_the_air(block_renderer), foot, side, Stroke(1e-3, 0.02)).peak_force_n > 0
+    touch = np.array([0.065, 0.0, 0.04])
+    for inside in ([0.05, 0.0, 0.04], [0.0605, 0.0, 0.04], [0.0649, 0.0, 0.04]):
+        with pytest.raises(OptionError, match="meets the surface"):
+            check_start(in_the_air(block_renderer), np.array(inside), touch, TIP)
+    check_start(in_the_air(block_renderer), np.array([0.067, 0.0, 0.04]), touch, TIP)

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 from palpate import cli
+from palpate.mechanics.errors import OptionError
 from palpate.mechanics.kernel_cache import ROOMS, sources
 from palpate.mechanics.options import option
 from palpate.operations._call import Call
 from palpate.operations._declare import operation
 from palpate.operations._list import commands
-from palpate.operations._to_argparse import add_operation
+from palpate.operations._to_argparse import OneLineParser, add_operation, vector
 from palpate.output import emit_json
 
 
@@ -40,6 +41,20 @@ def parse(*words: str) -> SampleOptions:
     parser = argparse.ArgumentParser()
     add_operation(parser, sample.operation)
     return sample.operation.run(vars(parser.parse_args(words)), Call())
+
+
+@pytest.mark.parametrize("joint", [" ", "="])
+def test_values_that_begin_with_a_minus_are_taken_as_typed(joint):
+    parser = OneLineParser()
+    for flag, kind in (("--at", vector), ("--up", str), ("--axes", str), ("--offset", float)):
+        parser.add_argument(flag, type=kind)
+    parser.add_argument("--holds", action="store_true")
+    words = f"--holds --at{joint}-0.01,0,0.02 --up{joint}-z --axes{joint}-y,x,z --offset{joint}-.5".split(" ")
+    found = parser.parse_args(words)
+    assert found.at.tolist() == [-0.01, 0, 0.02]
+    assert (found.up, found.axes, found.offset, found.holds) == ("-z", "-y,x,z", -0.5, True)
+    with pytest.raises(OptionError):
+        parser.parse_args(["--up", "--holds"])
 
 
 def test_options_become_flags_and_come_back():
