@@ -79,13 +79,23 @@ def say_signs(raw: RawCurves, signs: BestReading, notes: list[str]) -> None:
 
 
 def in_units(
-    raw: RawCurves, curves: Sequence[MachineCycle], tip_radius_m: float, notes: list[str], odds: list[float]
+    raw: RawCurves,
+    curves: Sequence[MachineCycle],
+    tip_radius_m: float | None,
+    notes: list[str],
+    odds: list[float],
 ) -> list[MachineCycle]:
     """The curves in the units that their dent and stiffness tell, where nobody said them. Raises Unclear
     where two may be meant, ContactError where no tip goes so deep."""
     depth, push = (float(np.median(v)) for v in zip(*map(_dent, curves), strict=True))
     z, fz = raw.columns["z"], raw.columns["fz"]
     length = force = 1.0
+    if tip_radius_m is None:
+        for kind, column in (("position", z), ("force", fz)):
+            if column.assumed:
+                units = tuple(f"{kind}={unit}" for unit in UNIT_SHARES[kind])
+                raise Unclear(f"'{raw.path}': the unit of '{column.name}' is not given", "units", units)
+        return list(curves)
     if z.assumed and depth > 0:
         sizes = {unit: depth * SI["position"][unit] / tip_radius_m for unit in UNIT_SHARES["position"]}
         length = _likely("position", sizes, raw, notes, odds)

@@ -6,7 +6,6 @@ solid does (`palpate.importing.meaning`).
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,8 +22,6 @@ from palpate.importing.curve_meaning import (
     signs_of,
     unclear_signs,
 )
-from palpate.importing.formats.registry import SHEET_SUFFIXES
-from palpate.importing.formats.sheets import lines_of
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import (
     MOST_ODDS,
@@ -34,7 +31,7 @@ from palpate.importing.meaning import (
     settled_clock,
 )
 from palpate.importing.tables import Table, read_tables
-from palpate.importing.units import SI, without_unit
+from palpate.importing.units import without_unit
 from palpate.mechanics.bounds import LARGEST_N
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import EXPLORATION
@@ -42,16 +39,9 @@ from palpate.mechanics.recording.recording import NotRead
 from palpate.render.press import COLUMNS as PRESS_COLUMNS
 
 LEAST_ROWS = 8
-_HEAD = 40
-"""Rows of a sheet in which the probe's radius may be said."""
 _ENTER, _LEAVE, _RETREAT = 0.25, 0.08, 0.05
 """A press begins above this share of the greatest force; the next one after it fell below the second, and the
 tip moved out by the third of its way."""
-_RADIUS = re.compile(
-    r"\b(?:probe|tip|indenter|sphere|ball|bead)\b[^\n]{0,20}?\b(radius|diameter)\b[^\n\d]{0,12}?"
-    r"(?:[\[(]\s*(m|mm|um|µm|nm)\s*[\])])?\s*[:=,;\t ]*\s*(\d+(?:[.,]\d+)?(?:e-?\d+)?)\s*(m|mm|um|µm|nm)?\b",
-    re.IGNORECASE,
-)
 
 
 @dataclass(frozen=True)
@@ -64,9 +54,9 @@ class CurvesRead:
     odds: float
 
 
-def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float) -> CurvesRead:
-    """The curves of files of one machine. Raises Unclear where two readings are likely, ContactError where
-    none is possible, RecordingError for a file that is no table."""
+def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float | None) -> CurvesRead:
+    """The curves of files of one machine; a tip that is pointed has no radius. Raises Unclear where two
+    readings are likely, ContactError where none is possible, RecordingError for a file that is no table."""
     said, stated = _aliases(said)
     notes: list[str] = []
     odds = [MOST_ODDS]
@@ -82,20 +72,6 @@ def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float) 
     curves = [c for raw in raws for c in _presses(raw, travel, load, notes)]
     curves = in_units(raws[0], curves, tip_radius_m, notes, odds)
     return CurvesRead(tuple(curves), tuple(dict.fromkeys(notes)), min(odds))
-
-
-def stated_radius(path: Path) -> float | None:
-    """m, of the probe, where the text before the numbers says it."""
-    if path.suffix.lower() in SHEET_SUFFIXES:
-        text = "\n".join(line for lines in lines_of(path).values() for line in lines[:_HEAD])
-    else:
-        text = path.read_bytes()[:4000].decode("latin-1").replace("Âµ", "µ")
-    found = _RADIUS.search(text)
-    if found is None:
-        return None
-    unit = (found[2] or found[4] or "m").lower().replace("µ", "u")
-    size = float(found[3].replace(",", ".")) * SI["position"][unit]
-    return size / 2 if found[1].lower() == "diameter" else size
 
 
 def _aliases(said: SaidOfCurves) -> tuple[SaidOfCurves, tuple[int | None, int | None]]:

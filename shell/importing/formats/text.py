@@ -32,7 +32,7 @@ _CLOCK = re.compile(r"(\d{1,3}):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 def read(path: Path) -> list[Table]:
     """The one table of a text file: the longest run of rows of numbers, named by the line before it."""
     raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
-    made = table_of(_decoded(raw).splitlines(), path.name)
+    made = table_of(decoded(raw).splitlines(), path.name)
     if made is None:
         raise RecordingError(f"'{path}' holds no rows of two numbers or more: is it a table?")
     return [made]
@@ -70,7 +70,8 @@ def table_of(
     return Table(name, dict(zip(names, values.T, strict=True)))
 
 
-def _decoded(raw: bytes) -> str:
+def decoded(raw: bytes) -> str:
+    """The text of a file's bytes, which may be cut anywhere."""
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16")
     try:
