@@ -63,6 +63,7 @@ _LOOP = (
 _READ = 0.01
 """Standard deviation of ln E that no curve tells of: how true a load cell, a travel and a tip are."""
 _FEW = "fewer than 6 curves: none can be held out, so no effect of the material is named"
+_NO_TIME = "without a time no curve is held out, and no effect of the material is named"
 _NO_SPHERE = "effects of the material are searched for under a sphere alone"
 _STRAIGHT = (
     "under a flat punch a machine that yields is as straight as the material: the modulus is that of both "
@@ -147,7 +148,7 @@ def material_of_few(
         error=approach.error,
         verdict=f"{approach.law} follows the way in best; {gone}",
         parameters=onset,
-        notes=(*notes, _FEW if tip.form == "sphere" else _NO_SPHERE),
+        notes=(*notes, _NO_SPHERE if tip.form != "sphere" else _FEW if tests.timed else _NO_TIME),
         unknown=(*INDENTATION_UNKNOWN, "which effect"),
         odds=tests.odds,
         seen=seen_of_few(bench, approach, None),

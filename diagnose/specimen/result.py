@@ -29,7 +29,7 @@ class MachineTests:
     """The curves of one kind: curves of an indentation, with the tip; tests of compression or
     tension; holds (t s, value) of relaxation. poisson_ratio: as the files state it; stated_modulus_pa: by the
     maker's own software, NaN where not said. notes: what was understood of the files; odds: of the least sure
-    of it."""
+    of it. timed: the clock of the curves means something."""
 
     kind: str
     curves: tuple[MachineCycle, ...] = ()
@@ -40,6 +40,7 @@ class MachineTests:
     stated_modulus_pa: float = float("nan")
     notes: tuple[str, ...] = ()
     odds: float = float("inf")
+    timed: bool = True
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -30,6 +30,7 @@ from palpate.importing.meaning import (
     joined,
     settled_clock,
 )
+from palpate.importing.side_by_side import side_by_side
 from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import without_unit
 from palpate.mechanics.bounds import LARGEST_N
@@ -39,6 +40,8 @@ from palpate.mechanics.recording.recording import NotRead
 from palpate.render.press import COLUMNS as PRESS_COLUMNS
 
 LEAST_ROWS = 8
+_UNTIMED_HZ = 100.0
+"""Of rows without a time: any, as nothing is read off it."""
 _ENTER, _LEAVE, _RETREAT = 0.25, 0.08, 0.05
 """A press begins above this share of the greatest force; the next one after it fell below the second, and the
 tip moved out by the third of its way."""
@@ -47,11 +50,12 @@ tip moved out by the third of its way."""
 @dataclass(frozen=True)
 class CurvesRead:
     """curves: one a press, travel into the sample, force that pushes the tip out. notes: what was understood
-    beyond the headers; odds: of the least sure of it."""
+    beyond the headers; odds: of the least sure of it; timed: all have a column of time."""
 
     curves: tuple[MachineCycle, ...]
     notes: tuple[str, ...]
     odds: float
+    timed: bool = True
 
 
 def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float | None) -> CurvesRead:
@@ -60,7 +64,7 @@ def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float |
     said, stated = _aliases(said)
     notes: list[str] = []
     odds = [MOST_ODDS]
-    raws = [_raw(path, said, notes, odds) for path in paths]
+    raws = [raw for path in paths for raw in _raws(path, said, notes, odds)]
     for raw in raws:
         _check_sizes(raw)
     signs = signs_of(raws, said, stated)
@@ -71,7 +75,8 @@ def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float |
     say_signs(raws[0], signs, notes)
     curves = [c for raw in raws for c in _presses(raw, travel, load, notes)]
     curves = in_units(raws[0], curves, tip_radius_m, notes, odds)
-    return CurvesRead(tuple(curves), tuple(dict.fromkeys(notes)), min(odds))
+    timed = all("t" in raw.columns for raw in raws)
+    return CurvesRead(tuple(curves), tuple(dict.fromkeys(notes)), min(odds), timed)
 
 
 def _aliases(said: SaidOfCurves) -> tuple[SaidOfCurves, tuple[int | None, int | None]]:
@@ -94,21 +99,35 @@ def _aliases(said: SaidOfCurves) -> tuple[SaidOfCurves, tuple[int | None, int | 
     return SaidOfCurves(columns, said.units, said.travel, said.compression, said.clock), (travel, load)
 
 
-def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -> RawCurves:
+def _raws(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -> list[RawCurves]:
+    """Of one file: a table, or a table a test."""
     tables = read_tables(path)
     if not said.columns and tuple(tables[0].columns) == PRESS_COLUMNS:
-        return _of_press(path, tables[0], notes)
+        return [_of_press(path, tables[0], notes)]
+    tests = [side_by_side(table) for table in tables]
+    several = max(tests, key=len)
+    if len(several) < 2:
+        return [_raw(path, tables, said, notes, odds)]
+    notes.append(f"'{path.name}' holds {len(several)} tests side by side")
+    return [_raw(path.with_name(test.name), [test], said, notes, odds) for test in several]
+
+
+def _raw(
+    path: Path, tables: list[Table], said: SaidOfCurves, notes: list[str], odds: list[float]
+) -> RawCurves:
     found = find_columns(tables, Said(columns=said.columns, units=said.units))
-    if "t" not in found:
-        raise RecordingError(
-            f"'{path}' has no column of time, and there are {_names(tables)}: --column t=NAME"
-        )
-    columns = {role: found[role] for role in ("t", "z", "fz")}
-    t, z, push = (np.asarray(c.values, float) for c in columns.values())
+    columns = {role: found[role] for role in ("t", "z", "fz") if role in found}
+    z, push = (np.asarray(columns[role].values, float) for role in ("z", "fz"))
+    t = np.asarray(columns["t"].values, float) if "t" in columns else np.arange(z.size) / _UNTIMED_HZ
     if t.ndim == 0 or z.ndim == 0 or push.ndim == 0 or len({len(t), len(z), len(push)}) > 1:
         raise RecordingError(
-            f"'{path}' needs time, travel and load in columns of one length, as --column depth=NAME and "
+            f"'{path}' needs travel and load in columns of one length, as --column depth=NAME and "
             f"--column load=NAME name them: {_names(tables)}"
+        )
+    if "t" not in columns:
+        notes.append(
+            "no column of time: the rows are taken in their order, so nothing that takes time is told "
+            "(--column t=NAME names one)"
         )
     good = numbers_in(path, t, z, push)
     t, z, push = t[good], np.sign(columns["z"].factor) * z[good], np.sign(columns["fz"].factor) * push[good]

@@ -129,12 +129,13 @@ def _indentations(paths: list[Path], said_tip: SaidOfTip, said: SaidOfCurves) ->
         said_tip = replace(said_tip, radius_m=said_tip.radius_m or data.tip_radius_m)
         heads.append(Header(modulus_pa=None if np.isnan(data.stated_modulus_pa) else data.stated_modulus_pa))
     said_tip = _of_files(said_tip, heads, notes)
-    odds = [MOST_ODDS]
+    odds, timed = [MOST_ODDS], True
     if others:
         read = read_curves(others, said, said_tip.radius_m)
         curves += read.curves
         notes += read.notes
         odds.append(read.odds)
+        timed = read.timed
     poisson = _alike([h.poisson_ratio for h in heads])
     form = said_tip.form or _form_by_curves(curves, said_tip.radius_m, poisson, odds)
     moduli = [h.modulus_pa for h in heads if h.modulus_pa is not None]
@@ -146,6 +147,7 @@ def _indentations(paths: list[Path], said_tip: SaidOfTip, said: SaidOfCurves) ->
         stated_modulus_pa=float(np.median(moduli)) if moduli else float("nan"),
         notes=tuple(notes),
         odds=min(odds),
+        timed=timed,
     )
 
 
