@@ -46,7 +46,7 @@ def signs_of(
         for signs, score in press_scores(raw.position, raw.load).items():
             scores[signs] += score
     name, travels = (
-        re.sub(r"[^a-z]", "", without_unit(raws[0].columns["z"].name).lower()),
+        re.sub(r"[^a-z]", "", without_unit(raws[0].columns["z"].name).rpartition(".")[2].lower()),
         vocabulary()["travel"],
     )
     into = _NAMED if name in travels["into"] else -_NAMED if name in travels["out"] else _USUAL

@@ -283,12 +283,15 @@ def _ends(name: str, role: str) -> bool:
 
 def _complete(tables: Sequence[Table], said: Said, found: dict[str, Column]) -> None:
     """A machine with one axis: its travel is downward z, its push fz; what is missing is 0."""
-    sideways = any(_key(name) in ("x", "y") for table in tables for name in table.columns)
+    sideways = any(
+        _key(name[_shared_prefix(table) :]) in ("x", "y") for table in tables for name in table.columns
+    )
     if not sideways and not any(role in found for role in "xyz"):
         along = named_first(tables, "travel")
         if along is not None:
             # travel counts into the sample, z out of it
-            sign = 1.0 if _key(along[1]) in vocabulary()["travel"]["out"] else -1.0
+            bare = _key(along[1][_shared_prefix(along[0]) :])
+            sign = 1.0 if bare in vocabulary()["travel"]["out"] else -1.0
             found["z"] = _column("z", *along, said, sign=sign, guessed=True)
     if not any(role in found for role in ("fx", "fy", "fz")):
         push = named_first(tables, "load")
@@ -304,7 +307,8 @@ def named_first(tables: Sequence[Table], what: str) -> tuple[Table, str] | None:
     """The column with the likeliest name of a machine's "travel" or "load"."""
     for word in vocabulary()[what]["names"]:
         for table in tables:
-            names = [name for name in table.columns if _key(name) == word]
+            inside = _shared_prefix(table)
+            names = [name for name in table.columns if _key(name[inside:]) == word]
             if names:
                 return table, names[0]
     return None

@@ -101,7 +101,7 @@ def test_a_column_of_words_stands_beside_numbers(tmp_path, column, at):
         "time ee_pose_x ee_pose_y ee_pose_z ft_wrench_x ft_wrench_y ft_wrench_z",
         "t O_T_EE_12 O_T_EE_13 O_T_EE_14 O_F_ext_hat_K_0 O_F_ext_hat_K_1 O_F_ext_hat_K_2",
         "t O_T_EE[12] O_T_EE[13] O_T_EE[14] f_x f_y f_z",
-        "ts arm.tcp.pose.x arm.tcp.pose.y arm.tcp.pose.z ft.wrench.force.x ft.wrench.force.y ft.wrench.force.z",
+        "ts arm.tcp.x arm.tcp.y arm.tcp.z ft.wrench.force.x ft.wrench.force.y ft.wrench.force.z",
     ],
 )
 def test_robots_names_are_recognised_beside_what_they_are_not(names):
