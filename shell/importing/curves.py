@@ -205,7 +205,10 @@ def _presses(raw: RawCurves, travel: int, load: int, notes: list[str]) -> list[M
         elif inside and over < _LEAVE * top and u[i] < begun - _RETREAT * way:
             inside, lowest = False, i
     spans = list(zip(cuts, [*cuts[1:], len(f)], strict=True))
+    short = sum(b - a < LEAST_ROWS for a, b in spans)
     spans = [s for s in spans if s[1] - s[0] >= LEAST_ROWS]
+    if short:
+        notes.append(f"'{raw.path.name}': {short} stretches of fewer than {LEAST_ROWS} rows are no presses")
     # the first cut is before the first press: what comes before it is its own free air
     if len(spans) > 1 and f[slice(*spans[0])].max() - level < _ENTER * top:
         spans = [(spans[0][0], spans[1][1]), *spans[2:]]
