@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.disk.mesh_parts import words_of
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.disk.scratch import cache_folder
 from palpate.mechanics.disk.surface_files import surface_of
@@ -178,7 +179,12 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
         scene,
         standing(surface, scene.up, scene.sink_m),
         ObjectMaterial(DEFAULT_MODULUS_PA, USUAL_POISSON_RATIO, inclusions=_balls(scene.inclusions or ())),
-        {"method": "scene", "mesh": surface.name, "mended": ", ".join(surface.notes)},
+        {
+            "method": "scene",
+            "mesh": surface.name,
+            "mended": ", ".join(surface.notes),
+            "parts": words_of(surface.parts),
+        },
         progress,
     )
 

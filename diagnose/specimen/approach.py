@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.integrate import trapezoid
 
-from palpate.diagnosis.specimen.bench import HAND_TIP_M, Bench
-from palpate.mechanics.contact.dent import dent_law
+from palpate.diagnosis.specimen.bench import Bench
+from palpate.mechanics.contact.tip import Tip
 from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
-APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")
 _BLOCKS = 8
-_SHIFTS = np.linspace(-0.1, 0.1, 41)
+_SHIFTS = np.linspace(-0.1, 0.1, 401)
+"""Of first touch, in shares of the depth: finer than what tells one law from another."""
 _PULLS = 5.0
 """Standard deviations of the noise that a pull must exceed: no noise reaches so far in some thousand rows."""
 
@@ -40,7 +39,7 @@ class Approach:
 
 def approach_of(bench: Bench) -> Approach:
     """The ways in of a bench's curves on a half-space."""
-    presses, nu = bench.model.presses, bench.model.material.poisson_ratio
+    presses, nu, tip = bench.model.presses, bench.model.material.poisson_ratio, bench.tip
     errors: dict[str, list[float]] = {}
     moduli: dict[str, list[float]] = {}
     shifts: dict[str, list[float]] = {}
@@ -49,8 +48,8 @@ def approach_of(bench: Bench) -> Approach:
         u, push = presses.depth[part], presses.push[part]
         top = int(np.argmax(push))
         ways = u[: top + 1], push[: top + 1]
-        for name in APPROACH_LAWS:
-            error, modulus, shift = _left_out(*ways, dent_law(name), nu)
+        for name in tip.laws:
+            error, modulus, shift = _left_out(*ways, tip, name, nu)
             errors.setdefault(name, []).append(error)
             shifts.setdefault(name, []).append(shift)
             moduli.setdefault(name, []).append(modulus)
@@ -66,7 +65,7 @@ def approach_of(bench: Bench) -> Approach:
         sure = pulls > _PULLS * white_noise_std(push[:, None])
         pull.append((pulls if sure else 0.0) / bench.similarity.force)
     medians = {name: float(np.median(values)) for name, values in errors.items()}
-    law = min(APPROACH_LAWS, key=lambda name: medians[name])
+    law = min(tip.laws, key=lambda name: medians[name])
     own = np.array(moduli[law]) / bench.similarity.modulus
     return Approach(medians, law, own, float(np.median(work)), np.array(pull), shifts[law][0])
 
@@ -75,16 +74,16 @@ def _blocks(count: int) -> np.ndarray:
     return np.minimum(np.arange(count) * _BLOCKS // max(count, 1), _BLOCKS - 1)
 
 
-def _left_out(u: np.ndarray, push: np.ndarray, law: Any, nu: float) -> tuple[float, float, float]:
+def _left_out(u: np.ndarray, push: np.ndarray, tip: Tip, law: str, nu: float) -> tuple[float, float, float]:
     """(held-out rms over rms, modulus, shift of first touch) of one way in; the last two are free."""
     span = float(u.max())
-    shapes = np.array([law.force(np.maximum(u - s * span, 0.0), 1.0, nu, HAND_TIP_M) for s in _SHIFTS])
+    shapes = np.array([tip.force(law, u - s * span, 1.0, nu) for s in _SHIFTS])
 
     def fitted(seen: np.ndarray) -> tuple[int, float]:
         power = np.maximum((shapes[:, seen] ** 2).sum(axis=1), 1e-300)
-        e = shapes[:, seen] @ push[seen] / power
-        k = int(np.argmin(((e[:, None] * shapes[:, seen] - push[seen]) ** 2).sum(axis=1)))
-        return k, float(e[k])
+        along = shapes[:, seen] @ push[seen]
+        k = int(np.argmax(np.maximum(along, 0.0) ** 2 / power))
+        return k, float(along[k] / power[k])
 
     block, predicted = _blocks(len(u)), np.zeros(len(u))
     for b in range(1, _BLOCKS - 1):

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.mechanics.contact.dent import dent_law
-from palpate.mechanics.errors import ContactError
+from palpate.mechanics.contact.tip import Tip
+from palpate.mechanics.errors import ContactError, OptionError
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
@@ -39,6 +39,8 @@ _WAY_ROWS = 60
 _MARGIN = 2.0
 _BASELINE = 0.1
 _LEAST_NOISE = 1e-3
+_STRAIGHT = 0.1
+"""Share of the peak from which a root of the force is straight."""
 _CONTACT = 8.0
 """A curve must rise above so many standard deviations of its noise."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -90,8 +92,8 @@ class Bench:
     """Curves as a recording of one place on a model, in a hand's size.
 
     similarity: what brought them there. onset_m: (c,) m, travel at first touch, in the machine's own zero;
-    modulus_pa: (c,) Pa, of each curve's way in by itself, by the exact sphere on a half-space. used: (c,)
-    bool, curves with a contact. specimens: every curve is of another piece.
+    modulus_pa: (c,) Pa, of each curve's way in by itself, by the tip's first law on a half-space. used: (c,)
+    bool, curves with a contact. specimens: every curve is of another piece. tip: in a hand's size.
     """
 
     recording: Recording
@@ -101,21 +103,26 @@ class Bench:
     modulus_pa: np.ndarray
     used: np.ndarray
     specimens: bool
+    tip: Tip
 
 
-def bench_of(
-    curves: Sequence[MachineCycle],
-    tip_radius_m: float,
-    *,
-    layer_m: float | None = None,
-    poisson_ratio: float = USUAL_POISSON_RATIO,
-    specimens: bool = False,
-) -> Bench:
-    """layer_m: thickness of the sample on its plate, None is a half-space. specimens: each curve is of
-    another piece, so each force is taken over its own stiffness. Raises ContactError where no curve has a
-    contact."""
-    length = HAND_TIP_M / tip_radius_m
-    pace = HAND_S / float(np.median([np.ptp(c.t) for c in curves]))
+@dataclass(frozen=True)
+class Touched:
+    """Curves whose way in has a contact: kept of all (used (c,) bool), each way in as a loading of travel m
+    and force N over free air, noise N, travel at first touch (k,) m with its standard error."""
+
+    kept: list[MachineCycle]
+    used: np.ndarray
+    loadings: list[Loading]
+    noise: float
+    onset: np.ndarray
+    error: np.ndarray
+
+
+def touched(curves: Sequence[MachineCycle], tip: Tip) -> Touched:
+    """Where each curve touches, by the power of the depth that the tip's force grows by. Raises ContactError
+    where none has a contact or all have too few rows."""
+    pace = _pace(curves)
     ready = [_levelled(c, pace) for c in curves]
     found = [_way_in(c) for c in ready]
     used = np.array([f is not None for f in found])
@@ -127,18 +134,71 @@ def bench_of(
         )
     kept = [(c, f) for c, f in zip(ready, found, strict=True) if f is not None]
     noise = float(np.median([n for _, (_, _, n) in kept]))
-    loadings = [Loading(length * u, push, np.zeros(3), UP) for _, (u, push, _) in kept]
+    loadings = [Loading(u, push, np.zeros(3), UP) for _, (u, push, _) in kept]
+    if tip.form == "sphere":
+        assert tip.radius_m is not None
+        onset, error = _first_touches(loadings, HAND_TIP_M / tip.radius_m, noise)
+    else:
+        onset, error = np.array([_touch_of_power(each, tip.power) for each in loadings]).T
+    return Touched([c for c, _ in kept], used, loadings, noise, onset, error)
+
+
+def _first_touches(loadings: Sequence[Loading], length: float, noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """m, of a sphere and their standard errors; length: to a hand's size, where the law is fitted."""
     top = float(np.median([each.push.max() for each in loadings]))
-    loadings = [Loading(each.u, each.push / top, each.origin, UP) for each in loadings]
+    hand = [Loading(length * each.u, each.push / top, each.origin, UP) for each in loadings]
     try:
-        onset, error = first_touches(loadings, noise / top)
+        onset, error = first_touches(hand, noise / top)
     except ValueError as wrong:
         raise ContactError("the curves have fewer than four samples on their way in") from wrong
-    law = dent_law("sphere")
-    own = np.array([_modulus(each, at, law, poisson_ratio) for each, at in zip(loadings, onset, strict=True)])
+    return onset / length, error / length
+
+
+def _touch_of_power(each: Loading, power: float) -> tuple[float, float]:
+    """(m, its standard error) of one way in whose force grows by that power of the depth: the root of the
+    force is straight, and its zero is the touch."""
+    over = each.push > _STRAIGHT * each.push.max()
+    if over.sum() < 4:
+        raise ContactError("the curves have fewer than four samples on their way in")
+    root = each.push[over] ** (1 / power)
+    (slope, at_zero), covariance = np.polyfit(root, each.u[over], 1, cov=True)
+    return float(at_zero), float(np.sqrt(covariance[1, 1]))
+
+
+def _pace(curves: Sequence[MachineCycle]) -> float:
+    return HAND_S / float(np.median([np.ptp(c.t) for c in curves]))
+
+
+def bench_of(
+    curves: Sequence[MachineCycle],
+    tip: Tip,
+    *,
+    layer_m: float | None = None,
+    poisson_ratio: float = USUAL_POISSON_RATIO,
+    specimens: bool = False,
+) -> Bench:
+    """layer_m: thickness of the sample on its plate, None is a half-space. specimens: each curve is of
+    another piece, so each force is taken over its own stiffness. Raises ContactError where no curve has a
+    contact, OptionError for a layer under another tip than a sphere."""
+    if layer_m is not None and tip.form != "sphere":
+        raise OptionError(
+            f"--layer is answered for a sphere alone, and --tip is '{tip.form}': leave --layer out, as of a "
+            "deep sample"
+        )
+    pace, found = _pace(curves), touched(curves, tip)
+    noise, used = found.noise, found.used
+    deep = np.array([each.u.max() - at for each, at in zip(found.loadings, found.onset, strict=True)])
+    length = HAND_TIP_M / (tip.radius_m or max(float(np.median(deep)), 1e-12))
+    top = float(np.median([each.push.max() for each in found.loadings]))
+    loadings = [Loading(length * each.u, each.push / top, each.origin, UP) for each in found.loadings]
+    onset, error = length * found.onset, length * found.error
+    hand = tip.scaled(length)
+    own = np.array(
+        [_modulus(each, at, hand, poisson_ratio) for each, at in zip(loadings, onset, strict=True)]
+    )
     middle = float(np.median(own))
     scale = middle / own if specimens else np.ones(len(own))
-    recording, times = _side_by_side([c for c, _ in kept], onset, length, scale / top, noise / top)
+    recording, times = _side_by_side(found.kept, onset, length, scale / top, noise / top)
     deepest = max(float(each.u.max() - at) for each, at in zip(loadings, onset, strict=True))
     contact = float(np.sqrt(HAND_TIP_M * max(deepest, 0.1 * HAND_TIP_M)))
     if layer_m is None:
@@ -173,7 +233,7 @@ def bench_of(
     similarity = Similarity(length, 1 / top, pace)
     every = np.full((2, len(curves)), np.nan)
     every[:, used] = onset / length, own / similarity.modulus
-    return Bench(lifted, model, similarity, every[0], every[1], used, specimens)
+    return Bench(lifted, model, similarity, every[0], every[1], used, specimens, hand)
 
 
 def _levelled(curve: MachineCycle, pace: float) -> MachineCycle:
@@ -209,8 +269,8 @@ def _level(curve: MachineCycle, peak: int) -> float:
     return float(np.median(early)) if curve.level_n is None else curve.level_n
 
 
-def _modulus(each: Loading, onset: float, law: Any, poisson_ratio: float) -> float:
-    shape = np.asarray(law.force(np.maximum(each.u - onset, 0.0), 1.0, poisson_ratio, HAND_TIP_M))
+def _modulus(each: Loading, onset: float, tip: Tip, poisson_ratio: float) -> float:
+    shape = tip.force(tip.laws[0], each.u - onset, 1.0, poisson_ratio)
     return float(shape @ each.push / max(shape @ shape, 1e-300))
 
 

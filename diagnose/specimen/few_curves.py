@@ -11,8 +11,8 @@ import numpy as np
 from scipy.stats import t as student
 
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.specimen.approach import APPROACH_LAWS, Approach
-from palpate.diagnosis.specimen.bench import HAND_TIP_M, Bench
+from palpate.diagnosis.specimen.approach import Approach
+from palpate.diagnosis.specimen.bench import Bench
 from palpate.diagnosis.specimen.machine_compliance import (
     Machine,
     Way,
@@ -23,7 +23,6 @@ from palpate.diagnosis.specimen.machine_compliance import (
 )
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.verdict.result import Diagnosis
-from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL
 
 Seen = tuple[np.ndarray, np.ndarray, np.ndarray, str, str]
@@ -35,12 +34,12 @@ def seen_of_few(bench: Bench, approach: Approach, machine: Machine | None) -> Se
     """The first curve, in the machine's size, and the law's over it."""
     part, like = bench.model.presses.parts[0], bench.similarity
     depth, push = bench.model.presses.depth[part] / like.length, bench.model.presses.push[part] / like.force
-    law = dent_law(approach.law if machine is None else machine.law)
+    law = approach.law if machine is None else machine.law
     modulus = float(approach.modulus_pa[0]) if machine is None else machine.modulus_pa
     shift = approach.first / like.length if machine is None else 0.0
     dent = np.linspace(0.0, max(float(depth.max()) - shift, 1e-12), _DRAWN)
-    radius = HAND_TIP_M / like.length
-    force = np.asarray(law.force(dent, modulus, bench.model.material.poisson_ratio, radius))
+    nu, tip = bench.model.material.poisson_ratio, bench.tip.scaled(1 / like.length)
+    force = tip.force(law, dent, modulus, nu)
     gives = 0.0 if machine is None else force / machine.stiffness_n_per_m
     return depth, push, np.interp(depth, dent + gives + shift, force), "depth [m]", "force [N]"
 
@@ -61,6 +60,17 @@ _LOOP = (
     "a loop so wide, or a force that fades while the tip rests, is creep, a late force or play: press more "
     "slowly and hold to separate them; a slow press may be as much softer as the interval says"
 )
+_READ = 0.01
+"""Standard deviation of ln E that no curve tells of: how true a load cell, a travel and a tip are."""
+_FEW = "fewer than 6 curves: none can be held out, so no effect of the material is named"
+_NO_TIME = "without a time no curve is held out, and no effect of the material is named"
+_NO_SPHERE = "effects of the material are searched for under a sphere alone"
+_STRAIGHT = (
+    "under a flat punch a machine that yields is as straight as the material: the modulus is that of both "
+    "together, too low where the machine is not far stiffer than the contact"
+)
+MACHINE_TAKES_ALL = "the machine's stiffness, which takes nearly all of the travel,"
+"""What a modulus that is the machine's is said to rest on."""
 _ALIKE = 1.1
 """The interval of a few curves covers laws that miss at most so many times what the best misses."""
 
@@ -70,7 +80,15 @@ def _both(modulus_pa: float, own: np.ndarray, interval: tuple[float, float]) -> 
     between = 0.0
     if len(own) > 1:
         between = student.ppf(0.975, len(own) - 1) * np.log(own).std(ddof=1) / np.sqrt(len(own))
-    low, high = (float(np.hypot(np.log(end / modulus_pa), between)) for end in interval)
+    return as_read(modulus_pa, interval, between)
+
+
+def as_read(modulus_pa: float, interval: tuple[float, float], log_half: float = 0.0) -> tuple[float, float]:
+    """Pa, 95 %, about a modulus: an interval, what else its logarithm is known by, and how truly forces and
+    travels are read at all."""
+    low, high = (
+        float(np.sqrt(np.log(end / modulus_pa) ** 2 + log_half**2 + (2 * _READ) ** 2)) for end in interval
+    )
     return modulus_pa * float(np.exp(-low)), modulus_pa * float(np.exp(high))
 
 
@@ -94,20 +112,23 @@ def material_of_few(
     pull = float(approach.pull_n.max())
     if pull > 0:
         gone += f", and it pulls by up to {_force(pull)} on the way out"
-    assert tests.tip_radius_m is not None
+    tip = tests.tip
+    assert tip is not None
     ways = _ways(tests, bench)
     slopes = [w.slope_n_per_m for w in ways if w.slope_n_per_m]
     if slopes:
         notes.append(f"free air slopes by {np.median(slopes):.3g} N/m of travel, which is taken off")
     machine: Machine | None = None
     nu = bench.model.material.poisson_ratio
-    if len(ways) > 1 or np.isfinite(approach.hysteresis):
-        machine = machine_of(ways, nu, tests.tip_radius_m, float(np.median(own)))
+    if tip.form == "punch":
+        notes.append(_STRAIGHT)
+    elif len(ways) > 1 or np.isfinite(approach.hysteresis):
+        machine = machine_of(ways, nu, tip, float(np.median(own)))
     lost = approach.hysteresis if approach.hysteresis > _WIDE else 0.0
     if lost:
         notes.append(_LOOP)
     limit = _ALIKE * approach.error[approach.law]
-    likely = [approach.law, *(n for n in APPROACH_LAWS if n != approach.law and approach.error[n] <= limit)]
+    likely = [approach.law, *(n for n in tip.laws if n != approach.law and approach.error[n] <= limit)]
     onset = {"onset_m": bench.onset_m[bench.used].tolist()}
     common = Material(
         kind="indentation",
@@ -120,15 +141,15 @@ def material_of_few(
             _both(
                 float(own.mean()),
                 own,
-                rigid_interval(ways, nu, tests.tip_radius_m, float(own.mean()), likely),
+                rigid_interval(ways, nu, tip, float(own.mean()), likely),
             ),
         ),
         law=approach.law,
         error=approach.error,
         verdict=f"{approach.law} follows the way in best; {gone}",
         parameters=onset,
-        notes=(*notes, "fewer than 6 curves: none can be held out, so no effect of the material is named"),
-        unknown=(*INDENTATION_UNKNOWN, "which effect, for want of curves"),
+        notes=(*notes, _NO_SPHERE if tip.form != "sphere" else _FEW if tests.timed else _NO_TIME),
+        unknown=(*INDENTATION_UNKNOWN, "which effect"),
         odds=tests.odds,
         seen=seen_of_few(bench, approach, None),
     )
@@ -140,9 +161,7 @@ def material_of_few(
         young_modulus_pa=machine.modulus_pa,
         young_modulus_ci95_pa=_with_loop(
             lost,
-            _both(
-                machine.modulus_pa, own_moduli(ways, nu, tests.tip_radius_m, machine), machine.modulus_ci95_pa
-            ),
+            _both(machine.modulus_pa, own_moduli(ways, nu, tip, machine), machine.modulus_ci95_pa),
         ),
         seen=seen_of_few(bench, approach, machine),
         law=machine.law,
@@ -150,6 +169,8 @@ def material_of_few(
         verdict=f"the machine yields by {machine.stiffness_n_per_m / 1e3:.3g} N/mm "
         f"({low / 1e3:.3g} to {high / 1e3:.3g}); {gone}",
         effects=(TOOL.name,),
+        at_bound=(MACHINE_TAKES_ALL,) if machine.takes_all else (),
+        bound_carries=machine.takes_all,
         parameters={**onset, TOOL.name: {"stiffness_n_per_m": machine.stiffness_n_per_m}},
         notes=(*common.notes, f"on a rigid machine the modulus would be {machine.rigid_modulus_pa:.4g} Pa"),
     )

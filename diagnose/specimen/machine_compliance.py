@@ -14,19 +14,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 
-from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.contact.tip import Tip
 
-LAWS = ("sphere", "hertz", "linear", "neo-hookean")
 _BETTER, _ALIKE = 0.93, 1.1
-"""Another law than the sphere's must miss at most the first share of what that misses; the intervals cover
+"""Another law than the tip's first must miss at most the first share of what that misses; the intervals cover
 laws that miss at most the second share of the least."""
-_POINTS, _BLOCKS = 60, 6
+_POINTS, BLOCKS = 60, 6
 _LOWEST = 0.03
 """Share of the peak below which noise and pull decide where the contact is."""
 _GAIN = 0.75
 """A machine that yields must miss at most this share of what the best rigid one misses."""
 _MATTERS, _SURE = 0.05, 4.0
 """Share of the travel in contact, and standard errors of its compliance, from which a machine is named."""
+ALL = 0.95
+"""A machine that takes this share of the travel in contact leaves too little to tell a modulus by: the dent
+is then no greater than what law, zero and tip are known by."""
 _DECADES, _TIMES = 2.0, 2.0
 _SLOPE_SURE, _SLOPE_MATTERS = 4.0, 0.01
 
@@ -56,7 +58,8 @@ class Way:
 class Machine:
     """modulus_pa with its 95 % interval, and stiffness_n_per_m of the machine with its own, by one fit of all
     curves with `law`; rigid_modulus_pa: of the same law on a rigid machine.
-    error, rigid_error: held-out rms over rms of the force."""
+    error, rigid_error: held-out rms over rms of the force. takes_all: nothing of the travel is left that
+    would tell a modulus."""
 
     modulus_pa: float
     modulus_ci95_pa: tuple[float, float]
@@ -66,6 +69,7 @@ class Machine:
     rigid_modulus_pa: float
     error: float
     rigid_error: float
+    takes_all: bool
 
 
 def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> Way:
@@ -90,12 +94,15 @@ def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> Way:
 class _YieldingFit:
     """One law, a machine that yields or not: E, c = 1 / K, and each way's first touch, least squares in N."""
 
-    def __init__(self, law: str, poisson_ratio: float, radius_m: float, deepest_m: float) -> None:
-        self.law = dent_law(law)
+    def __init__(self, law: str, poisson_ratio: float, tip: Tip, deepest_m: float) -> None:
         self.depth = np.concatenate([[0.0], np.geomspace(1e-4, 3.0, 400) * deepest_m])
-        self.unit = np.maximum.accumulate(
-            np.asarray(self.law.force(self.depth, 1.0, poisson_ratio, radius_m), dtype=float)
-        )
+        self.unit = np.maximum.accumulate(tip.force(law, self.depth, 1.0, poisson_ratio))
+
+    def machines_share(self, ways: Sequence[Way], log_e: float, c: float) -> float:
+        """Of the travel in contact at the greatest force."""
+        push = max(float(w.push.max()) for w in ways)
+        dent = float(np.interp(push / np.exp(log_e), self.unit, self.depth))
+        return c * push / max(c * push + dent, 1e-300)
 
     def solved(
         self, ways: Sequence[Way], kept: Sequence[np.ndarray], log_e: float, yields: bool
@@ -142,11 +149,11 @@ class _YieldingFit:
     ) -> tuple[tuple[float, float], list[tuple[float, float]], float]:
         """((log E, c) of all rows, those without each block of force, rms N of the blocks left out)."""
         blocks = [
-            np.minimum(np.arange(len(w.push)) * _BLOCKS // max(len(w.push), 1), _BLOCKS - 1) for w in ways
+            np.minimum(np.arange(len(w.push)) * BLOCKS // max(len(w.push), 1), BLOCKS - 1) for w in ways
         ]
         log_e, c, _ = self.fitted(ways, [np.ones(len(w.push)) for w in ways], guess, yields)
         missed, again = 0.0, []
-        for k in range(_BLOCKS):
+        for k in range(BLOCKS):
             kept = [(b != k).astype(float) for b in blocks]
             own, own_c, left = self.fitted(ways, kept, log_e, yields)
             again.append((own, own_c))
@@ -154,19 +161,44 @@ class _YieldingFit:
         return (log_e, c), again, float(np.sqrt(missed / sum(map(len, blocks))))
 
 
-def left_out_error(ways: Sequence[Way], poisson_ratio: float, radius_m: float, modulus_pa: float) -> float:
-    """rms of the blocks of force that the best law misses, on a rigid machine or one that yields, over the
-    rms of the force. modulus_pa: a first guess."""
-    deepest, guess = max(float(w.travel[-1] - w.travel[0]) for w in ways), float(np.log(modulus_pa))
-    fits = (_YieldingFit(name, poisson_ratio, radius_m, deepest) for name in LAWS)
-    return min(fit.left_out(ways, guess, yields)[2] for fit in fits for yields in (False, True)) / _rms(ways)
+@dataclass(frozen=True)
+class HeldOut:
+    """One law on a rigid machine or one that yields. missed: rms of the blocks of force that were left out
+    over the rms of the force; share: of the greatest travel in contact that the machine takes."""
+
+    law: str
+    missed: float
+    share: float
 
 
-def own_moduli(ways: Sequence[Way], poisson_ratio: float, radius_m: float, machine: Machine) -> np.ndarray:
+def held_out_laws(
+    ways: Sequence[Way],
+    poisson_ratio: float,
+    tip: Tip,
+    modulus_pa: float,
+    yields: Sequence[bool] = (False, True),
+) -> list[HeldOut]:
+    """Each law of the tip on a rigid machine (False) and on one that yields (True). modulus_pa: a first
+    guess."""
+    deepest, guess = _deepest(ways), float(np.log(modulus_pa))
+    found, rms = [], _rms(ways)
+    for name in tip.laws:
+        fit = _YieldingFit(name, poisson_ratio, tip, deepest)
+        for each in yields:
+            (log_e, c), _, missed = fit.left_out(ways, guess, each)
+            found.append(HeldOut(name, missed / rms, fit.machines_share(ways, log_e, c)))
+    return found
+
+
+def _deepest(ways: Sequence[Way]) -> float:
+    return max(float(w.travel[-1] - w.travel[0]) for w in ways)
+
+
+def own_moduli(ways: Sequence[Way], poisson_ratio: float, tip: Tip, machine: Machine) -> np.ndarray:
     """(w,) Pa of each way by itself, by the machine's law and stiffness."""
-    deepest = max(float(w.travel[-1] - w.travel[0]) for w in ways)
+    deepest = _deepest(ways)
     fit, start = (
-        _YieldingFit(machine.law, poisson_ratio, radius_m, deepest),
+        _YieldingFit(machine.law, poisson_ratio, tip, deepest),
         float(np.log(machine.modulus_pa)),
     )
     found = []
@@ -177,16 +209,14 @@ def own_moduli(ways: Sequence[Way], poisson_ratio: float, radius_m: float, machi
 
 
 def rigid_interval(
-    ways: Sequence[Way], poisson_ratio: float, radius_m: float, modulus_pa: float, laws: Sequence[str]
+    ways: Sequence[Way], poisson_ratio: float, tip: Tip, modulus_pa: float, laws: Sequence[str]
 ) -> tuple[float, float]:
     """Pa, 95 %, about modulus_pa, of a fit of all ways on a rigid machine: what it changes by without each
     block of force, over `laws`, the first of which modulus_pa is by."""
-    deepest, guess = max(float(w.travel[-1] - w.travel[0]) for w in ways), float(np.log(modulus_pa))
+    deepest, guess = _deepest(ways), float(np.log(modulus_pa))
     low, high, middle = 0.0, 0.0, 0.0
     for k, law in enumerate(laws):
-        (log_e, _), apart, _ = _YieldingFit(law, poisson_ratio, radius_m, deepest).left_out(
-            ways, guess, False
-        )
+        (log_e, _), apart, _ = _YieldingFit(law, poisson_ratio, tip, deepest).left_out(ways, guess, False)
         middle, half = (middle if k else log_e), _TIMES * float(_jackknifed(apart)[0])
         low, high = min(low, log_e - half - middle), max(high, log_e + half - middle)
     return modulus_pa * float(np.exp(low)), modulus_pa * float(np.exp(high))
@@ -196,35 +226,34 @@ def _rms(ways: Sequence[Way]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([w.push for w in ways]) ** 2)))
 
 
-def machine_of(
-    ways: Sequence[Way], poisson_ratio: float, radius_m: float, modulus_pa: float
-) -> Machine | None:
+def machine_of(ways: Sequence[Way], poisson_ratio: float, tip: Tip, modulus_pa: float) -> Machine | None:
     """The machine that yields, where that shows beside every law of the material. modulus_pa: a first guess.
 
     Needs two ways in or more; None where a rigid machine does as well.
     """
-    deepest = max(float(w.travel[-1] - w.travel[0]) for w in ways)
+    deepest = _deepest(ways)
     rms = _rms(ways)
     guess = float(np.log(modulus_pa))
     errors: dict[tuple[str, bool], float] = {}
     whole: dict[tuple[str, bool], tuple[float, float]] = {}
     apart: dict[tuple[str, bool], list[tuple[float, float]]] = {}
-    for name in LAWS:
-        fit = _YieldingFit(name, poisson_ratio, radius_m, deepest)
+    for name in tip.laws:
+        fit = _YieldingFit(name, poisson_ratio, tip, deepest)
         for yields in (False, True):
             whole[name, yields], apart[name, yields], missed = fit.left_out(ways, guess, yields)
             errors[name, yields] = missed / rms
-    rigid = min(LAWS, key=lambda name: errors[name, False])
-    law = min(LAWS, key=lambda name: errors[name, True])
-    if errors[law, True] > _BETTER * errors[LAWS[0], True]:
-        law = LAWS[0]
+    rigid = min(tip.laws, key=lambda name: errors[name, False])
+    law = min(tip.laws, key=lambda name: errors[name, True])
+    if errors[law, True] > _BETTER * errors[tip.laws[0], True]:
+        law = tip.laws[0]
     spread = _jackknifed(apart[law, True])
     log_e, c = whole[law, True]
+    share = _YieldingFit(law, poisson_ratio, tip, deepest).machines_share(ways, log_e, c)
     push = max(float(w.push.max()) for w in ways)
     matters = c * push > _MATTERS * deepest
     if not matters or errors[law, True] > _GAIN * errors[rigid, False] or c < _SURE * spread[1]:
         return None
-    likely = [name for name in LAWS if errors[name, True] <= _ALIKE * errors[law, True]]
+    likely = [name for name in tip.laws if errors[name, True] <= _ALIKE * errors[law, True]]
     ends = np.array(
         [
             np.array(whole[name, True]) + sign * _TIMES * _jackknifed(apart[name, True])
@@ -237,10 +266,11 @@ def machine_of(
         float(np.exp(log_e)), (float(np.exp(low[0])), float(np.exp(high[0]))),
         1 / c, (1 / high[1], 1 / max(low[1], 1e-12)),
         law, float(np.exp(whole[law, False][0])), errors[law, True], errors[rigid, False],
+        share > ALL or log_e > guess + (_DECADES - 0.2) * np.log(10),
     )  # fmt: skip
 
 
 def _jackknifed(again: Sequence[tuple[float, float]]) -> np.ndarray:
     """(2,) standard errors of (log E, c) from fits that leave out a block each."""
     values = np.array(again)
-    return np.sqrt((_BLOCKS - 1) / _BLOCKS * ((values - values.mean(0)) ** 2).sum(0))
+    return np.sqrt((BLOCKS - 1) / BLOCKS * ((values - values.mean(0)) ** 2).sum(0))

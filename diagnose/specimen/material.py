@@ -12,20 +12,28 @@ from scipy.stats import t as student
 
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.specimen.approach import approach_of
-from palpate.diagnosis.specimen.bench import Bench, MachineCycle, bench_of
+from palpate.diagnosis.specimen.bench import PEAK_N, Bench, MachineCycle, bench_of
 from palpate.diagnosis.specimen.bench_diagnosis import (
     diagnose_bench,
     held_out_rivals,
     modulus_interval,
     unseen_holds,
 )
-from palpate.diagnosis.specimen.few_curves import INDENTATION_UNKNOWN, material_of_few, seen_of_all
+from palpate.diagnosis.specimen.few_curves import (
+    INDENTATION_UNKNOWN,
+    MACHINE_TAKES_ALL,
+    as_read,
+    material_of_few,
+    seen_of_all,
+)
+from palpate.diagnosis.specimen.machine_compliance import ALL
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.specimen.zero import bias, late_contact
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.effects.finite_strain import EFFECT as FINITE
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.effects.strain_stiffening import EFFECT as STIFFENING
+from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL
 from palpate.mechanics.effects.viscoelasticity import EFFECT as PRONY
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
@@ -59,7 +67,7 @@ def material_of(
     files: Sequence[str | Path],
     *,
     layer_m: float | None = None,
-    poisson_ratio: float = USUAL_POISSON_RATIO,
+    poisson_ratio: float | None = None,
     specimens: bool = False,
     fast: bool = False,
     seed: int = 0,
@@ -70,21 +78,20 @@ def material_of(
     names = tuple(Path(f).name for f in files)
     if layer_m is not None and not layer_m > 0:
         raise OptionError(f"--layer is {layer_m} m; it must be greater than 0")
-    if not POISSON_RATIO.takes(poisson_ratio):
+    if poisson_ratio is not None and not POISSON_RATIO.takes(poisson_ratio):
         raise OptionError(f"--poisson-ratio is {poisson_ratio}; it must be {POISSON_RATIO.words}")
     if tests.kind in ("compression", "tension"):
         return _uniaxial(tests, names)
     if tests.kind == "relaxation":
         return _relaxation(tests, names)
-    assert tests.tip_radius_m is not None
+    tip = tests.tip
+    assert tip is not None
+    nu, source = _poisson_of(poisson_ratio, tests)
 
     def bench(curves: Sequence[MachineCycle]) -> Bench:
-        assert tests.tip_radius_m is not None
-        return bench_of(
-            curves, tests.tip_radius_m, layer_m=layer_m, poisson_ratio=poisson_ratio, specimens=specimens
-        )
+        return bench_of(curves, tip, layer_m=layer_m, poisson_ratio=nu, specimens=specimens)
 
-    curves, words = late_contact(tests.curves, poisson_ratio, tests.tip_radius_m)
+    curves, words = late_contact(tests.curves, nu, tip)
     found = bench(curves)
     if words is not None:
         else_pa = float(np.median(approach_of(bench(tests.curves)).modulus_pa))
@@ -94,7 +101,17 @@ def material_of(
         words = f"the force reads {read[0]:.3g} N in free air, which is taken off"
         notes = (*tests.notes, f"{words}: the modulus would be {read[1]:.4g} Pa if it were not")
         tests = replace(tests, notes=notes)
-    return _indentation(tests, found, names, fast, seed, progress)
+    made = _indentation(tests, found, names, fast, seed, progress)
+    return replace(made, tip=tip, poisson_ratio=nu, poisson_from=source)
+
+
+def _poisson_of(stated: float | None, tests: MachineTests) -> tuple[float, str]:
+    """(Poisson's ratio, who said it)."""
+    if stated is not None:
+        return stated, "stated"
+    if tests.poisson_ratio is not None:
+        return tests.poisson_ratio, "file"
+    return USUAL_POISSON_RATIO, "assumed"
 
 
 def _uniaxial(tests: MachineTests, names: tuple[str, ...]) -> Material:
@@ -179,7 +196,9 @@ def _indentation(
     if np.isfinite(tests.stated_modulus_pa):
         notes.append(f"the maker's software states {tests.stated_modulus_pa:.4g} Pa")
     approach = approach_of(bench)
-    made = diagnose_bench(bench, fast=fast, seed=seed, progress=progress)
+    made = None
+    if bench.tip.form == "sphere" and tests.timed:
+        made = diagnose_bench(bench, fast=fast, seed=seed, progress=progress)
     if made is None:
         return material_of_few(tests, bench, approach, names, notes)
     own = bench.modulus_pa[bench.used]
@@ -192,9 +211,12 @@ def _indentation(
         modulus, interval = float(np.median(own)), tuple(map(float, np.quantile(own, [0.025, 0.975])))
     else:
         modulus = made.young_modulus_pa / bench.similarity.modulus
-        interval = modulus_interval(bench, made)
+        interval = as_read(modulus, modulus_interval(bench, made))
     assert made.attribution is not None
     ideal, at_bound = made.attribution.ideal.found.modulus / bench.similarity.modulus, made.at_bound
+    parameters = _named_parameters(bench, made)
+    takes_all = _takes_all(bench, parameters)
+    at_bound += (MACHINE_TAKES_ALL,) if takes_all else ()
     if made.effects:
         plain = quantity_words("young_modulus_pa", ideal)
         notes.append(f"without {_listed(made.effects)} the modulus would be {plain}")
@@ -212,15 +234,23 @@ def _indentation(
         effects=made.effects,
         closed=made.gap_closed,
         closed_ci95=made.gap_closed_ci95,
-        parameters=_named_parameters(bench, made),
+        parameters=parameters,
         at_bound=at_bound,
-        bound_carries=bool(at_bound) and not interval[0] <= ideal <= interval[1],
+        bound_carries=takes_all or bool(at_bound) and not interval[0] <= ideal <= interval[1],
         notes=(*notes, *made.reasons),
         unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - tested)),
         diagnosis=made,
         odds=tests.odds,
         seen=seen_of_all(bench, made),
     )
+
+
+def _takes_all(bench: Bench, parameters: dict[str, dict[str, Any]]) -> bool:
+    """Whether the machine that was named leaves nothing of the travel that would tell a modulus."""
+    if TOOL.name not in parameters:
+        return False
+    gives = PEAK_N / bench.similarity.force / parameters[TOOL.name]["stiffness_n_per_m"]
+    return gives > ALL * float(np.median(bench.model.presses.depth_m)) / bench.similarity.length
 
 
 def _held_out_errors(bench: Bench, made: Diagnosis) -> dict[str, float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.contact.tip import Tip
 from palpate.mechanics.result import Result
 from palpate.reconstruction.machine_curves.uniaxial import Uniaxial
 from palpate.reconstruction.steps.s7_modulus.held_out import BETTER
@@ -25,18 +26,21 @@ FLOORS = {
 
 @dataclass(frozen=True)
 class MachineTests:
-    """The curves of one kind: curves of an indentation, with the tip's radius; tests of compression or
-    tension; holds (t s, value) of relaxation. stated_modulus_pa: by the maker's own software, NaN where not
-    said. notes: what was understood of the files; odds: of the least sure of it."""
+    """The curves of one kind: curves of an indentation, with the tip; tests of compression or
+    tension; holds (t s, value) of relaxation. poisson_ratio: as the files state it; stated_modulus_pa: by the
+    maker's own software, NaN where not said. notes: what was understood of the files; odds: of the least sure
+    of it. timed: the clock of the curves means something."""
 
     kind: str
     curves: tuple[MachineCycle, ...] = ()
     tests: tuple[Uniaxial, ...] = ()
     holds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
-    tip_radius_m: float | None = None
+    tip: Tip | None = None
+    poisson_ratio: float | None = None
     stated_modulus_pa: float = float("nan")
     notes: tuple[str, ...] = ()
     odds: float = float("inf")
+    timed: bool = True
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,7 +52,8 @@ class Material(Result):
     named. parameters: by law or effect, SI. unknown: what such a test cannot tell. seen: (x, measured,
     predicted, axes' words). at_bound: parameters at the end of the search; bound_carries: the
     modulus goes with them, as without them it lies outside its interval. odds: of the least sure of
-    what was understood of the files. `plot`: measured and predicted. `show`: nothing, it has no place in
+    what was understood of the files. tip, poisson_ratio: of an indentation; poisson_from: who said the ratio
+    ("stated", "file" or "assumed"). `plot`: measured and predicted. `show`: nothing, it has no place in
     space.
     """
 
@@ -72,6 +77,9 @@ class Material(Result):
     at_bound: tuple[str, ...] = ()
     bound_carries: bool = False
     odds: float = float("inf")
+    tip: Tip | None = None
+    poisson_ratio: float = float("nan")
+    poisson_from: str = ""
 
     @property
     def missed(self) -> float:

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from palpate.diagnosis.specimen.bench import Bench, MachineCycle
-from palpate.diagnosis.specimen.machine_compliance import Way, left_out_error
-from palpate.mechanics.contact.dent import dent_law
+from palpate.diagnosis.specimen.machine_compliance import Way, held_out_laws
+from palpate.mechanics.contact.tip import Tip
 from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
 _PUSHES, _OFF = 0.03, 0.01
@@ -27,7 +27,7 @@ _AIR = 0.03
 
 
 def late_contact(
-    curves: Sequence[MachineCycle], poisson_ratio: float, radius_m: float
+    curves: Sequence[MachineCycle], poisson_ratio: float, tip: Tip
 ) -> tuple[list[MachineCycle], str | None]:
     """The curves, whose zero is the file's own where contact began before the first row, and words for that;
     the curves as they are, and None, where free air was recorded or the zero may as well be wrong."""
@@ -40,8 +40,11 @@ def late_contact(
         return list(curves), None
     raw = [_way(c, 0.0) for c in curves]
     levelled = [_way(c, level) for c, (level, _) in zip(curves, first, strict=True)]
-    modulus = _hertz(curves[0], radius_m)
-    late, wrong = (left_out_error(ways, poisson_ratio, radius_m, modulus) for ways in (raw, levelled))
+    modulus = _first_guess(curves[0], poisson_ratio, tip)
+    late, wrong = (
+        min(each.missed for each in held_out_laws(ways, poisson_ratio, tip, modulus))
+        for ways in (raw, levelled)
+    )
     if late > _GAIN * wrong:
         return list(curves), None
     words = (
@@ -55,8 +58,7 @@ def bias(curves: Sequence[MachineCycle], bench: Bench) -> tuple[float, float] | 
     """(N, Pa): what the machine reads in free air, median of the curves, and the modulus if it were not
     taken off; None where it is not surely above a hundredth of the peak."""
     levels, top, moduli = [], [], []
-    law, nu = dent_law("sphere"), bench.model.material.poisson_ratio
-    radius = bench.recording.tip_radius_m / bench.similarity.length
+    nu, tip = bench.model.material.poisson_ratio, bench.tip.scaled(1 / bench.similarity.length)
     for curve, onset in zip(curves, bench.onset_m, strict=True):
         if not np.isfinite(onset):
             continue
@@ -67,7 +69,7 @@ def bias(curves: Sequence[MachineCycle], bench: Bench) -> tuple[float, float] | 
             continue
         levels.append(float(np.median(force[air])))
         top.append(float(force[-1]))
-        shape = np.asarray(law.force(np.maximum(u, 0.0), 1.0, nu, radius))
+        shape = tip.force(tip.laws[0], u, 1.0, nu)
         moduli.append(float(shape @ force / max(shape @ shape, 1e-300)))
     if not levels:
         return None
@@ -94,8 +96,8 @@ def _way(curve: MachineCycle, level: float) -> Way:
     return Way.thinned(curve.travel[: peak + 1], curve.force[: peak + 1] - level)
 
 
-def _hertz(curve: MachineCycle, radius_m: float) -> float:
+def _first_guess(curve: MachineCycle, poisson_ratio: float, tip: Tip) -> float:
     """Pa, a first guess from the whole of the way in."""
     peak = int(np.argmax(curve.force))
     deep = max(float(np.ptp(curve.travel[: peak + 1])), 1e-12)
-    return float(np.ptp(curve.force)) / (16 / 9 * np.sqrt(radius_m) * deep**1.5)
+    return tip.guess_modulus(deep, float(np.ptp(curve.force)), poisson_ratio)

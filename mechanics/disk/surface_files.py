@@ -9,13 +9,15 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.mechanics.disk.gmsh1 import is_gmsh1, read_gmsh1
+from palpate.mechanics.disk.mesh_parts import Part, bodies, labels
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
 from palpate.mechanics.errors import SurfaceError
@@ -41,12 +43,13 @@ one."""
 @dataclass(frozen=True)
 class ClosedSurface:
     """vertices: (n, 3) m, in the file's frame. triangles: (m, 3), outward. name: of the file. notes: what was
-    mended, in words."""
+    mended, in words. parts: the bodies or labels that it tells apart, none where it is one."""
 
     vertices: np.ndarray
     triangles: np.ndarray
     name: str
     notes: tuple[str, ...] = ()
+    parts: tuple[Part, ...] = ()
 
     @property
     def size_m(self) -> float:
@@ -73,7 +76,9 @@ def read_surface(path: Path | str, unit: str = "m") -> ClosedSurface:
         raise SurfaceError(f"--unit is '{unit}'; allowed are {', '.join(UNITS)}")
     if not path.is_file():
         raise SurfaceError(f"'{path}' {no_file(path)}: name a file that is there")
-    return _closed(_shell_of(path), path.name, unit)
+    shell, labelled = _shell_of(path, UNITS[unit])
+    with _silent():
+        return _closed(shell, path.name, unit, labelled, path)
 
 
 def surface_of(shape: Any, unit: str = "m") -> ClosedSurface:
@@ -93,10 +98,13 @@ def surface_of(shape: Any, unit: str = "m") -> ClosedSurface:
     if unit not in UNITS:
         raise SurfaceError(f"unit is '{unit}'; allowed are {', '.join(UNITS)}")
     mesh = trimesh.Trimesh(np.array(shape.vertices, dtype=float), np.array(shape.faces), process=False)
-    return _closed(mesh, "the mesh", unit)
+    with _silent():
+        return _closed(mesh, "the mesh", unit)
 
 
-def _closed(shell: trimesh.Trimesh, name: str, unit: str) -> ClosedSurface:
+def _closed(
+    shell: trimesh.Trimesh, name: str, unit: str, labelled: tuple[Part, ...] = (), path: Path | None = None
+) -> ClosedSurface:
     shell = _cleaned(shell)
     if not len(shell.faces):
         raise SurfaceError(f"'{name}' holds no triangles: export the object as a surface of triangles")
@@ -106,13 +114,17 @@ def _closed(shell: trimesh.Trimesh, name: str, unit: str) -> ClosedSurface:
     if shell.volume < 0:
         shell.invert()
     if not shell.volume > 1e-6 * size**3:
-        raise SurfaceError(f"'{name}' encloses no volume: a solid object is needed, not a sheet")
+        raise SurfaceError(
+            f"'{name}' encloses no volume: it is a sheet, or it crosses itself, so that inside and outside "
+            "cancel; a solid object is needed: mend it in the program that made the file"
+        )
     vertices = np.asarray(shell.vertices) * UNITS[unit]
-    return ClosedSurface(vertices, np.asarray(shell.faces, dtype=np.int64), name, notes)
+    parts = labelled or bodies(shell, path, UNITS[unit])
+    return ClosedSurface(vertices, np.asarray(shell.faces, dtype=np.int64), name, notes, parts)
 
 
-def _shell_of(path: Path) -> trimesh.Trimesh:
-    """The triangles of a file, in its own unit."""
+def _shell_of(path: Path, metres: float) -> tuple[trimesh.Trimesh, tuple[Part, ...]]:
+    """The triangles of a file, in its own unit, and the labels of its cells."""
     import trimesh
 
     suffix = path.suffix.lower()
@@ -122,14 +134,19 @@ def _shell_of(path: Path) -> trimesh.Trimesh:
                 loaded: Any = trimesh.load(path, force="mesh", resolver=_within(path.resolve().parent))
                 if not isinstance(loaded, trimesh.Trimesh):
                     raise SurfaceError(f"'{path}' holds no triangles: export the object as a surface")
-                return loaded
+                return loaded, ()
             if suffix in BY_VTK:
-                return _boundary(read_vtk(path, SurfaceError))
+                return _boundary(read_vtk(path, SurfaceError), {}, metres)
             import meshio
             import pyvista
 
             with _silent():
-                return _boundary(pyvista.from_meshio(meshio.read(path, file_format=BY_MESHIO[suffix])))
+                if suffix == ".msh" and is_gmsh1(path):
+                    held = read_gmsh1(path)
+                else:
+                    held = meshio.read(path, file_format=BY_MESHIO[suffix])
+                names = {int(about[0]): name for name, about in held.field_data.items() if len(about) == 2}
+                return _boundary(pyvista.from_meshio(held), names, metres)
     except SurfaceError:
         raise
     except ImportError as error:
@@ -178,22 +195,27 @@ def _silent() -> Iterator[None]:
         logging.disable(level)
 
 
-def _boundary(grid: Any) -> trimesh.Trimesh:
-    """The outer faces of a VTK data set: of its solid cells where it has any."""
+def _boundary(grid: Any, names: Mapping[int, str], metres: float) -> tuple[trimesh.Trimesh, tuple[Part, ...]]:
+    """The outer faces of a VTK data set: of its solid cells where it has any; and their labels, which may be
+    named."""
     import pyvista
     import trimesh
 
     if isinstance(grid, pyvista.MultiBlock):
         grid = grid.combine()
+    parts: tuple[Part, ...] = ()
     if isinstance(grid, pyvista.UnstructuredGrid):
         solid = np.isin(grid.celltypes, _SOLID)
-        grid = grid.extract_cells(np.flatnonzero(solid).tolist()) if solid.any() else grid
+        if solid.any():
+            grid = grid.extract_cells(np.flatnonzero(solid).tolist())
+            parts = labels(grid, names, metres)
     if not isinstance(grid, pyvista.PolyData):
         grid = grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=0)
     shell = grid.triangulate()
     if shell.n_cells == 0 or not len(shell.faces):
-        return trimesh.Trimesh()
-    return trimesh.Trimesh(np.asarray(shell.points, dtype=float), shell.faces.reshape(-1, 4)[:, 1:])
+        return trimesh.Trimesh(), parts
+    faces = shell.faces.reshape(-1, 4)[:, 1:]
+    return trimesh.Trimesh(np.asarray(shell.points, dtype=float), faces), parts
 
 
 _SOLID = (10, 11, 12, 13, 14, 24, 25, 26, 27, 29, 37)

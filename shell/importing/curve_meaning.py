@@ -18,11 +18,10 @@ from palpate.importing.meaning import (
     press_scores,
 )
 from palpate.importing.units import SI, without_unit
+from palpate.importing.vocabulary import vocabulary
 from palpate.mechanics.errors import ContactError, RecordingError
 from palpate.mechanics.plausible import CURVE, UNIT_SHARES
 
-_INTO = ("depth", "indentation", "indent", "compression", "travel", "penetration")
-_OUT = ("height", "gap", "toolgap")
 _NAMED, _USUAL = float(np.log(6.0)), float(np.log(2.0))
 """What a name tells of a direction, and that z points up, travel down, load into the sample (nats)."""
 
@@ -46,8 +45,12 @@ def signs_of(
     for raw in raws:
         for signs, score in press_scores(raw.position, raw.load).items():
             scores[signs] += score
-    name = re.sub(r"[^a-z]", "", without_unit(raws[0].columns["z"].name).lower())
-    into = _NAMED if name in _INTO else -_NAMED if name in _OUT else -_USUAL if name == "z" else _USUAL
+    name, travels = (
+        re.sub(r"[^a-z]", "", without_unit(raws[0].columns["z"].name).rpartition(".")[2].lower()),
+        vocabulary()["travel"],
+    )
+    into = _NAMED if name in travels["into"] else -_NAMED if name in travels["out"] else _USUAL
+    into = -_USUAL if name == "z" else into
     for a, b in list(scores):
         scores[a, b] += into * (a > 0) + _USUAL * (b > 0)
     kept = {
@@ -79,13 +82,23 @@ def say_signs(raw: RawCurves, signs: BestReading, notes: list[str]) -> None:
 
 
 def in_units(
-    raw: RawCurves, curves: Sequence[MachineCycle], tip_radius_m: float, notes: list[str], odds: list[float]
+    raw: RawCurves,
+    curves: Sequence[MachineCycle],
+    tip_radius_m: float | None,
+    notes: list[str],
+    odds: list[float],
 ) -> list[MachineCycle]:
     """The curves in the units that their dent and stiffness tell, where nobody said them. Raises Unclear
     where two may be meant, ContactError where no tip goes so deep."""
     depth, push = (float(np.median(v)) for v in zip(*map(_dent, curves), strict=True))
     z, fz = raw.columns["z"], raw.columns["fz"]
     length = force = 1.0
+    if tip_radius_m is None:
+        for kind, column in (("position", z), ("force", fz)):
+            if column.assumed:
+                units = tuple(f"{kind}={unit}" for unit in UNIT_SHARES[kind])
+                raise Unclear(f"'{raw.path}': the unit of '{column.name}' is not given", "units", units)
+        return list(curves)
     if z.assumed and depth > 0:
         sizes = {unit: depth * SI["position"][unit] / tip_radius_m for unit in UNIT_SHARES["position"]}
         length = _likely("position", sizes, raw, notes, odds)

@@ -6,7 +6,6 @@ solid does (`palpate.importing.meaning`).
 
 from __future__ import annotations
 
-import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,8 +22,6 @@ from palpate.importing.curve_meaning import (
     signs_of,
     unclear_signs,
 )
-from palpate.importing.formats.registry import SHEET_SUFFIXES
-from palpate.importing.formats.sheets import lines_of
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import (
     MOST_ODDS,
@@ -33,8 +30,9 @@ from palpate.importing.meaning import (
     joined,
     settled_clock,
 )
+from palpate.importing.side_by_side import side_by_side
 from palpate.importing.tables import Table, read_tables
-from palpate.importing.units import SI, without_unit
+from palpate.importing.units import without_unit
 from palpate.mechanics.bounds import LARGEST_N
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import EXPLORATION
@@ -42,35 +40,31 @@ from palpate.mechanics.recording.recording import NotRead
 from palpate.render.press import COLUMNS as PRESS_COLUMNS
 
 LEAST_ROWS = 8
-_HEAD = 40
-"""Rows of a sheet in which the probe's radius may be said."""
+_UNTIMED_HZ = 100.0
+"""Of rows without a time: any, as nothing is read off it."""
 _ENTER, _LEAVE, _RETREAT = 0.25, 0.08, 0.05
 """A press begins above this share of the greatest force; the next one after it fell below the second, and the
 tip moved out by the third of its way."""
-_RADIUS = re.compile(
-    r"\b(?:probe|tip|indenter|sphere|ball|bead)\b[^\n]{0,20}?\b(radius|diameter)\b[^\n\d]{0,12}?"
-    r"(?:[\[(]\s*(m|mm|um|µm|nm)\s*[\])])?\s*[:=,;\t ]*\s*(\d+(?:[.,]\d+)?(?:e-?\d+)?)\s*(m|mm|um|µm|nm)?\b",
-    re.IGNORECASE,
-)
 
 
 @dataclass(frozen=True)
 class CurvesRead:
     """curves: one a press, travel into the sample, force that pushes the tip out. notes: what was understood
-    beyond the headers; odds: of the least sure of it."""
+    beyond the headers; odds: of the least sure of it; timed: all have a column of time."""
 
     curves: tuple[MachineCycle, ...]
     notes: tuple[str, ...]
     odds: float
+    timed: bool = True
 
 
-def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float) -> CurvesRead:
-    """The curves of files of one machine. Raises Unclear where two readings are likely, ContactError where
-    none is possible, RecordingError for a file that is no table."""
+def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float | None) -> CurvesRead:
+    """The curves of files of one machine; a tip that is pointed has no radius. Raises Unclear where two
+    readings are likely, ContactError where none is possible, RecordingError for a file that is no table."""
     said, stated = _aliases(said)
     notes: list[str] = []
     odds = [MOST_ODDS]
-    raws = [_raw(path, said, notes, odds) for path in paths]
+    raws = [raw for path in paths for raw in _raws(path, said, notes, odds)]
     for raw in raws:
         _check_sizes(raw)
     signs = signs_of(raws, said, stated)
@@ -81,21 +75,8 @@ def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float) 
     say_signs(raws[0], signs, notes)
     curves = [c for raw in raws for c in _presses(raw, travel, load, notes)]
     curves = in_units(raws[0], curves, tip_radius_m, notes, odds)
-    return CurvesRead(tuple(curves), tuple(dict.fromkeys(notes)), min(odds))
-
-
-def stated_radius(path: Path) -> float | None:
-    """m, of the probe, where the text before the numbers says it."""
-    if path.suffix.lower() in SHEET_SUFFIXES:
-        text = "\n".join(line for lines in lines_of(path).values() for line in lines[:_HEAD])
-    else:
-        text = path.read_bytes()[:4000].decode("latin-1").replace("Âµ", "µ")
-    found = _RADIUS.search(text)
-    if found is None:
-        return None
-    unit = (found[2] or found[4] or "m").lower().replace("µ", "u")
-    size = float(found[3].replace(",", ".")) * SI["position"][unit]
-    return size / 2 if found[1].lower() == "diameter" else size
+    timed = all("t" in raw.columns for raw in raws)
+    return CurvesRead(tuple(curves), tuple(dict.fromkeys(notes)), min(odds), timed)
 
 
 def _aliases(said: SaidOfCurves) -> tuple[SaidOfCurves, tuple[int | None, int | None]]:
@@ -118,21 +99,35 @@ def _aliases(said: SaidOfCurves) -> tuple[SaidOfCurves, tuple[int | None, int | 
     return SaidOfCurves(columns, said.units, said.travel, said.compression, said.clock), (travel, load)
 
 
-def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -> RawCurves:
+def _raws(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -> list[RawCurves]:
+    """Of one file: a table, or a table a test."""
     tables = read_tables(path)
     if not said.columns and tuple(tables[0].columns) == PRESS_COLUMNS:
-        return _of_press(path, tables[0], notes)
+        return [_of_press(path, tables[0], notes)]
+    tests = [side_by_side(table) for table in tables]
+    several = max(tests, key=len)
+    if len(several) < 2:
+        return [_raw(path, tables, said, notes, odds)]
+    notes.append(f"'{path.name}' holds {len(several)} tests side by side")
+    return [_raw(path.with_name(test.name), [test], said, notes, odds) for test in several]
+
+
+def _raw(
+    path: Path, tables: list[Table], said: SaidOfCurves, notes: list[str], odds: list[float]
+) -> RawCurves:
     found = find_columns(tables, Said(columns=said.columns, units=said.units))
-    if "t" not in found:
-        raise RecordingError(
-            f"'{path}' has no column of time, and there are {_names(tables)}: --column t=NAME"
-        )
-    columns = {role: found[role] for role in ("t", "z", "fz")}
-    t, z, push = (np.asarray(c.values, float) for c in columns.values())
+    columns = {role: found[role] for role in ("t", "z", "fz") if role in found}
+    z, push = (np.asarray(columns[role].values, float) for role in ("z", "fz"))
+    t = np.asarray(columns["t"].values, float) if "t" in columns else np.arange(z.size) / _UNTIMED_HZ
     if t.ndim == 0 or z.ndim == 0 or push.ndim == 0 or len({len(t), len(z), len(push)}) > 1:
         raise RecordingError(
-            f"'{path}' needs time, travel and load in columns of one length, as --column depth=NAME and "
+            f"'{path}' needs travel and load in columns of one length, as --column depth=NAME and "
             f"--column load=NAME name them: {_names(tables)}"
+        )
+    if "t" not in columns:
+        notes.append(
+            "no column of time: the rows are taken in their order, so nothing that takes time is told "
+            "(--column t=NAME names one)"
         )
     good = numbers_in(path, t, z, push)
     t, z, push = t[good], np.sign(columns["z"].factor) * z[good], np.sign(columns["fz"].factor) * push[good]
@@ -210,7 +205,10 @@ def _presses(raw: RawCurves, travel: int, load: int, notes: list[str]) -> list[M
         elif inside and over < _LEAVE * top and u[i] < begun - _RETREAT * way:
             inside, lowest = False, i
     spans = list(zip(cuts, [*cuts[1:], len(f)], strict=True))
+    short = sum(b - a < LEAST_ROWS for a, b in spans)
     spans = [s for s in spans if s[1] - s[0] >= LEAST_ROWS]
+    if short:
+        notes.append(f"'{raw.path.name}': {short} stretches of fewer than {LEAST_ROWS} rows are no presses")
     # the first cut is before the first press: what comes before it is its own free air
     if len(spans) > 1 and f[slice(*spans[0])].max() - level < _ENTER * top:
         spans = [(spans[0][0], spans[1][1]), *spans[2:]]

@@ -12,6 +12,7 @@ from typing import Any
 from palpate.importing.formats.registry import TEXT_SUFFIXES
 from palpate.importing.machine_tests import is_chiaro, kind_of
 from palpate.importing.mapping import Said, find_columns
+from palpate.importing.side_by_side import side_by_side
 from palpate.importing.tables import read_tables
 from palpate.mechanics.disk.reading import no_file
 from palpate.mechanics.disk.surface_files import is_surface_file
@@ -66,6 +67,7 @@ def kind_of_file(path: Path, columns: Mapping[str, str], units: Mapping[str, str
     tables = read_tables(path)
     if not columns and tuple(tables[0].columns) == PRESS_COLUMNS:
         return "curves"
-    found = find_columns(tables, Said(columns=columns, units=units))
+    first = [side_by_side(table)[0] for table in tables]
+    found = find_columns(first, Said(columns=columns, units=units))
     sideways = [found[role] for role in ("x", "y") if found[role].table is not None]
     return "table" if sideways else "curves"

@@ -9,36 +9,39 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.result import MachineTests
+from palpate.diagnosis.specimen.tip_form import form_scores
 from palpate.importing.curve_meaning import SaidOfCurves
-from palpate.importing.curves import LEAST_ROWS, numbers_in, read_curves, stated_radius
-from palpate.importing.formats.registry import SHEET_SUFFIXES, TEXT_SUFFIXES
-from palpate.importing.meaning import MOST_ODDS, Unclear
+from palpate.importing.curves import LEAST_ROWS, numbers_in, read_curves
+from palpate.importing.headers import Header, header_of
+from palpate.importing.meaning import MOST_ODDS, Unclear, best
 from palpate.importing.tables import read_tables
+from palpate.mechanics.contact.tip import POINTED, WORDS, Tip
 from palpate.mechanics.errors import OptionError, RecordingError
-from palpate.mechanics.plausible import MACHINE_TIP_RADIUS
+from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.reconstruction.machine_curves.indentation import read_chiaro
 from palpate.reconstruction.machine_curves.uniaxial import of_compression, read_tension
-from palpate.words import mm
+from palpate.words import listed, mm
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
-_SAYING = (*TEXT_SUFFIXES, *SHEET_SUFFIXES)
-"""Files with words beside the numbers."""
 _BEYOND = 1e15
 _MODULUS = ("relaxationmodulus", "modulus", "g", "e")
+T = TypeVar("T")
 
 
 def read_tests(
     files: Sequence[str | Path],
     *,
     kind: str = "auto",
-    tip_radius_m: float | None = None,
+    tip: SaidOfTip | None = None,
     said: SaidOfCurves | None = None,
 ) -> MachineTests:
     """All files, which must be of one kind. Raises RecordingError where one cannot be read or is of another
@@ -61,7 +64,7 @@ def read_tests(
         return MachineTests("tension", tests=tuple(map(read_tension, paths)))
     if test_of[0] == "relaxation":
         return MachineTests("relaxation", holds=tuple(_hold(p) for p in paths))
-    return _indentations(paths, tip_radius_m, said or SaidOfCurves())
+    return _indentations(paths, tip or SaidOfTip(), said or SaidOfCurves())
 
 
 def kind_of(path: Path) -> str:
@@ -103,37 +106,105 @@ def _hold(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return t[fresh], value[fresh]
 
 
-def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCurves) -> MachineTests:
+@dataclass(frozen=True)
+class SaidOfTip:
+    """What was said of the tip: a form of FORMS, m, degrees."""
+
+    form: str | None = None
+    radius_m: float | None = None
+    half_angle_deg: float | None = None
+
+
+def _indentations(paths: list[Path], said_tip: SaidOfTip, said: SaidOfCurves) -> MachineTests:
     chiaro = [not said.columns and is_chiaro(path) for path in paths]
-    curves, stated, notes, odds = [], [], [], MOST_ODDS
+    others = [p for p, own in zip(paths, chiaro, strict=True) if not own]
+    heads = [header_of(p) for p in paths]
+    notes: list[str] = []
+    curves = []
+    if len(others) < len(paths):  # a Chiaro's probe is a sphere
+        said_tip = replace(said_tip, form=said_tip.form or "sphere")
     for path in (p for p, own in zip(paths, chiaro, strict=True) if own):
         data = read_chiaro(path)
         curves.append(MachineCycle(data.t, data.travel, data.force, path.name))
-        tip_radius_m = tip_radius_m or data.tip_radius_m
-        stated.append(data.stated_modulus_pa)
-    others = [p for p, own in zip(paths, chiaro, strict=True) if not own]
-    if tip_radius_m is None:
-        radii = {stated_radius(p) for p in others if p.suffix.lower() in _SAYING} - {None}
-        tip_radius_m = radii.pop() if len(radii) == 1 else None
-        if tip_radius_m is not None:
-            notes.append(f"tip radius {mm(tip_radius_m, '.4g')}, as the file says")
-    if tip_radius_m is None:
-        raise Unclear("the tip's radius in m is in no file", "tip_radius_m", ())
-    low, high = MACHINE_TIP_RADIUS.low, MACHINE_TIP_RADIUS.high
-    if not low <= tip_radius_m <= high:
-        raise OptionError(
-            f"--tip-radius is {tip_radius_m:g} m; it must lie between {low:g} and {high:g} m: give metres"
-        )
+        said_tip = replace(said_tip, radius_m=said_tip.radius_m or data.tip_radius_m)
+        heads.append(Header(modulus_pa=None if np.isnan(data.stated_modulus_pa) else data.stated_modulus_pa))
+    said_tip = _of_files(said_tip, heads, notes)
+    odds, timed = [MOST_ODDS], True
     if others:
-        read = read_curves(others, said, tip_radius_m)
+        read = read_curves(others, said, said_tip.radius_m)
         curves += read.curves
         notes += read.notes
-        odds = read.odds
-    good = [s for s in stated if np.isfinite(s)]
+        odds.append(read.odds)
+        timed = read.timed
+    poisson = _alike([h.poisson_ratio for h in heads])
+    form = said_tip.form or _form_by_curves(curves, said_tip.radius_m, poisson, odds)
+    moduli = [h.modulus_pa for h in heads if h.modulus_pa is not None]
     return MachineTests(
-        "indentation", curves=tuple(curves), tip_radius_m=tip_radius_m,
-        stated_modulus_pa=float(np.median(good)) if good else float("nan"), notes=tuple(notes), odds=odds,
-    )  # fmt: skip
+        "indentation",
+        curves=tuple(curves),
+        tip=Tip(form, said_tip.radius_m, said_tip.half_angle_deg),
+        poisson_ratio=poisson,
+        stated_modulus_pa=float(np.median(moduli)) if moduli else float("nan"),
+        notes=tuple(notes),
+        odds=min(odds),
+        timed=timed,
+    )
+
+
+def _of_files(said: SaidOfTip, heads: Sequence[Header], notes: list[str]) -> SaidOfTip:
+    """The tip as it was said, else as the files' text says it. Raises Unclear where its size is in
+    neither."""
+    form = said.form or _alike([h.form for h in heads])
+    if form is None and said.half_angle_deg is not None:
+        raise Unclear("an angle of the tip is given, and its form is not", "tip", POINTED)
+    if form is not None and said.form is None:
+        notes.append(f"the tip is {WORDS[form]}, as the file says")
+    if form in POINTED:
+        angle = said.half_angle_deg or _alike([h.half_angle_deg for h in heads])
+        if angle is None:
+            raise Unclear(
+                f"the half angle of {WORDS[form]}, from its axis to a flank in degrees, is in no file",
+                "tip_angle_deg",
+                (),
+            )
+        return SaidOfTip(Tip(form, None, angle).form, None, angle)
+    radius = said.radius_m
+    if radius is None:
+        radius = _alike([h.radius_m for h in heads])
+        if radius is not None:
+            notes.append(f"tip radius {mm(radius, '.4g')}, as the file says")
+    if radius is None:
+        raise Unclear("the tip's radius in m is in no file", "tip_radius_m", ())
+    return SaidOfTip(form, Tip(form or "sphere", radius).radius_m)
+
+
+def _form_by_curves(
+    curves: Sequence[MachineCycle], radius_m: float | None, poisson_ratio: float | None, odds: list[float]
+) -> str:
+    """The form that nobody said: a sphere, unless the curves speak against one: then raises Unclear."""
+    assert radius_m is not None
+    scores = form_scores(curves, radius_m, poisson_ratio or USUAL_POISSON_RATIO)
+    forms = list(scores)
+    reading = best({(k,): scores[form] for k, form in enumerate(forms)})
+    if forms[reading.value[0]] == "sphere" and reading.sure:
+        odds.append(reading.odds)
+        return "sphere"
+    other = max((f for f in forms if f != "sphere"), key=lambda f: scores[f])
+    against = float(np.exp(min(scores[other] - scores["sphere"], np.log(MOST_ODDS))))
+    named = POINTED if other == "cone" else (other,)
+    either = listed((WORDS[form] for form in named), "or")
+    raise Unclear(
+        f"the form of the tip is in no file, and the force grows as {either} gives it (odds against a sphere "
+        f"{against:.2g} to 1)",
+        "tip",
+        (*named, "sphere"),
+    )
+
+
+def _alike(values: Sequence[T | None]) -> T | None:
+    """What all files that say it say alike."""
+    said = {value for value in values if value is not None}
+    return said.pop() if len(said) == 1 else None
 
 
 def is_chiaro(path: Path) -> bool:

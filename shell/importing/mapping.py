@@ -1,5 +1,5 @@
 """What the columns of other people's tables are: said by name, number or a mapping file, else guessed from
-names.
+names, by the words of vocabulary.toml.
 
 A mapping file is TOML:
 
@@ -27,6 +27,7 @@ import numpy as np
 
 from palpate.importing.tables import Table
 from palpate.importing.units import SI, plain, unit_in, without_unit
+from palpate.importing.vocabulary import says, vocabulary
 from palpate.mechanics.disk.reading import read_toml
 from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
 from palpate.mechanics.errors import RecordingError
@@ -155,26 +156,8 @@ class Column:
         return f"{self.role} = {sign}{self.name}{unit} ({how})"
 
 
-_AXIS = {"x": ("x", "0"), "y": ("y", "1"), "z": ("z", "2")}
-_BEFORE = {
-    "position": "pos position p tcp tip tippos tipposition tcppose tcpposition toolposition actualtcppose"
-    " pose poseposition poseposeposition translation transformtranslation ee eepos probe probepos"
-    " loc location flange flangeposition flangepos weg",
-    "force": "f force forces wrenchforce ft tcpforce actualtcpforce wrench load sensorforce forcetorque"
-    " kraft",
-    "quaternion": "q quat quaternion orientation poseorientation poseposeorientation rotation"
-    " transformrotation rot flangeorientation",
-}
-_TIME = (
-    "t time times timestamp timestamps stamp ts sec secs seconds elapsed elapsedtime clock datetime date zeit"
-)
 _ORDERED = re.compile(r"(.*?)_?(xyzw|wxyz)\W*(\d)\W*$", re.IGNORECASE)
 """An array of quaternions whose name tells the order of its columns."""
-_ALONG = (
-    "depth displacement travel indentation indent extension compression crosshead stroke position z piezo"
-    " height gap weg"
-)
-_PUSH = "force load fn normalforce f reaction reactionforce fz push kraft"
 
 
 def _key(name: str) -> str:
@@ -260,20 +243,11 @@ def _column(
 
 def _guess(tables: Sequence[Table], role: str) -> tuple[Table, str] | None:
     """The one column whose name says the role; None where none or several do."""
-    if role == "t":
-        wanted = set(_TIME.split())
-    elif role.startswith("q"):
-        before = _BEFORE["quaternion"].split()
-        wanted = {b + end for b in before for end in (role, role[1])} | {role}
-    else:
-        kind = KIND[role]
-        wanted = {b + end for b in _BEFORE[kind].split() for end in _AXIS[role[-1]]}
-        wanted |= {role} | {end + b for b in ("pos", "position") for end in role if kind == "position"}
     matches = []
     for table in tables:
         inside = _shared_prefix(table)
         own_name = {name: _key(name[inside:]) for name in table.columns}
-        named = [name for name, own in own_name.items() if own in wanted or _ends(name, role, wanted)]
+        named = [name for name, own in own_name.items() if says(role).fullmatch(own) or _ends(name, role)]
         # X (N) is a force, whatever X is else
         named += [name for name, own in own_name.items() if role[0] == "f" and own == role[1]]
         own = [name for name in dict.fromkeys(named) if _may_be(name, role, own_name[name])]
@@ -296,27 +270,31 @@ def _may_be(name: str, role: str, own: str) -> bool:
     return not kinds or KIND.get(role) in kinds
 
 
-def _ends(name: str, role: str, wanted: set[str]) -> bool:
+def _ends(name: str, role: str) -> bool:
     """Whether the end of a dotted name says the role: msg.wrench.force.x."""
     parts = re.split(r"[./]", name)
-    last = _key(parts[-1])
+    last, whole = _key(parts[-1]), says(role)
     # an axis alone is anything's
-    return len(parts) > 1 and (
-        (len(last) > 1 and last in wanted) or any(_key("".join(parts[-k:])) in wanted for k in (2, 3))
+    return len(parts) > 1 and bool(
+        (len(last) > 1 and whole.fullmatch(last))
+        or any(whole.fullmatch(_key("".join(parts[-k:]))) for k in (2, 3))
     )
 
 
 def _complete(tables: Sequence[Table], said: Said, found: dict[str, Column]) -> None:
     """A machine with one axis: its travel is downward z, its push fz; what is missing is 0."""
-    sideways = any(_key(name) in ("x", "y") for table in tables for name in table.columns)
+    sideways = any(
+        _key(name[_shared_prefix(table) :]) in ("x", "y") for table in tables for name in table.columns
+    )
     if not sideways and not any(role in found for role in "xyz"):
-        along = _first(tables, _ALONG)
+        along = named_first(tables, "travel")
         if along is not None:
             # travel counts into the sample, z out of it
-            sign = 1.0 if _key(along[1]) in ("z", "height", "gap") else -1.0
+            bare = _key(along[1][_shared_prefix(along[0]) :])
+            sign = 1.0 if bare in vocabulary()["travel"]["out"] else -1.0
             found["z"] = _column("z", *along, said, sign=sign, guessed=True)
     if not any(role in found for role in ("fx", "fy", "fz")):
-        push = _first(tables, _PUSH)
+        push = named_first(tables, "load")
         if push is not None:
             found["fz"] = _column("fz", *push, said, guessed=True)
     for axes in (("x", "y", "z"), ("fx", "fy", "fz")):
@@ -325,10 +303,12 @@ def _complete(tables: Sequence[Table], said: Said, found: dict[str, Column]) -> 
             found.update({axis: Column(axis, None, "", 0.0, "", True) for axis in axes[:2]})
 
 
-def _first(tables: Sequence[Table], words: str) -> tuple[Table, str] | None:
-    for word in words.split():
+def named_first(tables: Sequence[Table], what: str) -> tuple[Table, str] | None:
+    """The column with the likeliest name of a machine's "travel" or "load"."""
+    for word in vocabulary()[what]["names"]:
         for table in tables:
-            names = [name for name in table.columns if _key(name) == word]
+            inside = _shared_prefix(table)
+            names = [name for name in table.columns if _key(name[inside:]) == word]
             if names:
                 return table, names[0]
     return None

@@ -34,7 +34,7 @@ class Unclear(RecordingError):
 
     def __init__(self, question: str, option: str, choices: Sequence[str]) -> None:
         self.question, self.option, self.choices = question, option, tuple(choices)
-        flag = "--" + option.removesuffix("_m").replace("_", "-")
+        flag = "--" + option.removesuffix("_m").removesuffix("_deg").replace("_", "-")
         either = listed((f"{flag} {choice}" for choice in choices), "or")
         super().__init__(f"{question}: say {either or flag + ' NUMBER'}")
 

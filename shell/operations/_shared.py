@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from palpate.mechanics.contact.tip import FORMS
 from palpate.mechanics.disk.surface_files import UNITS, is_surface_file
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import pairs
@@ -47,6 +48,18 @@ Units = Annotated[
     option("units of the columns; kinds: position, force, time", metavar="KIND=UNIT,...", parse=_split),
 ]
 """In Python {kind: unit}."""
+TipForm = Annotated[
+    str | None,
+    option(
+        "form of a machine's tip; None: as the file says, else a sphere where the curves allow it",
+        choices=FORMS,
+    ),
+]
+"""A sphere and a flat punch have a radius, the others an angle."""
+TipAngle = Annotated[
+    float | None,
+    option("half angle of a cone or pyramid, axis to flank", unit="degrees", flag="--tip-angle"),
+]
 ClockOfRows = Annotated[
     str | None,
     option(

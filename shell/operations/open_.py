@@ -21,6 +21,8 @@ from palpate.operations._shared import (
     MODEL,
     ClockOfRows,
     Seed,
+    TipAngle,
+    TipForm,
     Units,
     columns_option,
     named,
@@ -51,7 +53,12 @@ def open(
     report: Annotated[
         str | None, report_option("the page; default: NAME-palpate.html here, 'none' for no page")
     ] = None,
+    tip: TipForm = None,
     tip_radius_m: Annotated[float | None, option("radius of the tip, if no file gives it", unit="m")] = None,
+    tip_angle_deg: TipAngle = None,
+    poisson_ratio: Annotated[
+        float | None, option("of the material; None: as the file says, else 0.49")
+    ] = None,
     columns: Annotated[
         Mapping[str, str] | None,
         columns_option("as of import; of curves t, depth (or height), load", advanced=True),
@@ -100,14 +107,23 @@ def open(
     )  # fmt: skip
     of_file = {"tip_radius_m": tip_radius_m, "columns": columns, "units": units, "clock": clock}
     thing = {"slab_m": slab_m} if slab_m else {"half_space": True} if half_space else {}
-    made = partial(_reconstructed, files, thing, save=save, seed=seed, progress=call.wanted)
+    of_material = {} if poisson_ratio is None else {"poisson_ratio": poisson_ratio}
+    made = partial(
+        _reconstructed, files, {**thing, **of_material}, save=save, seed=seed, progress=call.wanted
+    )
+    of_tip = {"tip": tip, "tip_angle_deg": tip_angle_deg}
+    if kind != "curves":
+        _sphere_alone(of_tip)
     match kind:
         case "model":
             result = _model(files)
         case "mesh":
-            result = _mesh(files, save, unit, tip_radius_m, young_modulus_pa, call.wanted)
+            result = _mesh(files, save, unit, tip_radius_m, young_modulus_pa, of_material, call.wanted)
         case "curves":
-            of_machine = {"travel": travel, "compression": compression, "layer_m": layer_m, "fast": fast}
+            of_machine = {
+                "travel": travel, "compression": compression, "layer_m": layer_m, "fast": fast,
+                **of_material, **of_tip,
+            }  # fmt: skip
             result = _curves(files, seed=seed, progress=call.wanted, **of_file, **of_machine)
         case "table":
             result = _table(files, made, thing=thing, force_on=force_on, **of_file)
@@ -118,6 +134,17 @@ def open(
         call.then(lambda: [f"report: {result.report(page)}"])
     call.exit_code = 0 if result.good else 1
     return result
+
+
+def _sphere_alone(of_tip: Mapping[str, Any]) -> None:
+    """Raise OptionError for a tip that recordings, surfaces and models know nothing of."""
+    for name, value in of_tip.items():
+        if value not in (None, "sphere"):
+            flag = "--" + name.removesuffix("_deg").replace("_", "-")
+            raise OptionError(
+                f"{flag} is {value}, and an object is pressed by a sphere alone: leave {flag} out (a "
+                "machine's curves take other tips)"
+            )
 
 
 def _model(files: tuple[Any, ...]) -> Opened:
@@ -133,13 +160,20 @@ def _mesh(
     unit: str,
     tip_radius_m: float | None,
     modulus_pa: float | None,
+    of_material: Mapping[str, Any],
     progress: bool | Progress,
 ) -> Opened:
     from palpate.importing.kinds import Opened
     from palpate.operations.model import model_of
 
     made = model_of(
-        _only(files), modulus_pa, save=save, unit=unit, tip_radius_m=tip_radius_m, progress=progress
+        _only(files),
+        modulus_pa,
+        save=save,
+        unit=unit,
+        tip_radius_m=tip_radius_m,
+        progress=progress,
+        **of_material,
     )
     notes = () if modulus_pa else ("no modulus was given: 20000 Pa is taken; --modulus PA sets another",)
     understood = {"took it for": f"the surface of an object, lengths in {unit}"}

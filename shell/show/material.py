@@ -27,7 +27,7 @@ def story(result: Material) -> say.Story:
     yield say.Headline(f"{result.kind}: {counted(result.curves, 'curve')}; {_first(result)}", on=say.TEXT)
     yield say.Headline(lead(result), on=say.PAGE)
     if np.isfinite(result.young_modulus_pa):
-        yield say.TextLine(_modulus(result).replace(" of ", " ", 1))
+        yield say.TextLine(_modulus(result).replace(" of ", " ", 1) + _given(result))
     yield say.Sentence(meaning(result), on=say.PAGE)
     yield say.Next(next_steps(result))
     first = f"{Path(result.files[0]).name} as it was measured, and {_by(result)} over it."
@@ -104,10 +104,23 @@ def lead(result: Material) -> str:
     first = _first(result)
     if not np.isfinite(result.young_modulus_pa):
         return sentence(first)
-    said = f"The material has a {_modulus(result)}."
+    said = f"The material has a {_modulus(result)}{_given(result)}."
     if not result.predicts or result.at_bound or result.beaten_by:
         return f"{sentence(first)} {said}"
     return f"{said[:-1]}; {first}."
+
+
+def _given(result: Material) -> str:
+    """What the modulus goes with: ', of a sphere ..., for Poisson's ratio 0.49 (nobody stated it)'."""
+    if result.tip is None:
+        return ""
+    who = {
+        "stated": "as stated",
+        "file": "as the file says",
+        "assumed": "assumed: --poisson-ratio sets another",
+    }
+    ratio = f"{result.poisson_ratio:.3g} ({who[result.poisson_from]})"
+    return f", under {result.tip.words}, for Poisson's ratio {ratio}"
 
 
 def _modulus(result: Material) -> str:
@@ -133,7 +146,9 @@ def meaning(result: Material) -> str:
 def next_steps(result: Material) -> list[str]:
     """What to do with the answer."""
     if not result.predicts:
-        return ["give more curves, or say what the files do not (`--tip-radius`, `--layer`, `--units`)"]
+        return [
+            "give more curves, or say what the files do not (`--tip`, `--tip-radius`, `--layer`, `--units`)"
+        ]
     if not np.isfinite(result.young_modulus_pa):
         return []
     modulus = float(f"{result.young_modulus_pa:.3g}")
@@ -154,6 +169,9 @@ _WAYS = {
     "spring": "a spring alone",
     "hertz": "Hertz's law of a ball",
     "sphere": "the law of a true ball",
+    "punch": "the law of a flat punch",
+    "cone": "the law of a cone",
+    "pyramid": "the law of a pyramid",
     "linear": "a linear law",
     "neo-hookean": "the neo-Hookean law",
     "yeoh": "Yeoh's law, two terms",
@@ -200,6 +218,9 @@ KEYS: tuple[say.Key, ...] = (
     "notes",
     "unknown",
     "predicts",
+    ("poisson_ratio", lambda result: _finite(result.poisson_ratio)),
+    "poisson_from",
+    ("tip", lambda result: result.tip and result.tip.form),
     "at_bound",
     "bound_carries_modulus=bound_carries",
 )

@@ -98,6 +98,8 @@ def story(result: Model) -> say.Story:
     mesh, nu = result.mesh, result.material.poisson_ratio
     height = float(result.support.height(mesh.points).max())
     yield say.Headline(f"Model of {result.name}: {modulus_words(result)}, Poisson's ratio {nu:g}")
+    if parts := parts_words(result):
+        yield say.Note(parts)
     yield say.Sentence(f"About as soft as {softness(result.material.young_modulus_pa)}", on=say.PAGE)
     where = file_words(result.path, "MODEL")
     yield say.Next([
@@ -128,6 +130,7 @@ KEYS: tuple[say.Key, ...] = (
     ("tetrahedra", lambda result: len(result.mesh.tetrahedra)),
     "support_point_m=support.point",
     "support_normal=support.normal",
+    ("parts", lambda result: result.provenance.get("parts", "")),
 )
 
 
@@ -163,6 +166,12 @@ def place(result: Model, plotter: Plotter) -> None:
 def presses_words(model: Model) -> str:
     """How many presses it holds, and whether anybody made them: '32 virtual presses'."""
     return f"{len(model.presses)} {'virtual ' if model.untouched else ''}presses"
+
+
+def parts_words(model: Model) -> str:
+    """What of a mesh that holds several bodies or labels was made one; '' where it is one."""
+    parts = model.provenance.get("parts", "")
+    return f"the file holds {parts}: all of it is taken for one solid of one modulus" if parts else ""
 
 
 def modulus_words(model: Model) -> str:

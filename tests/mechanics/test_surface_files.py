@@ -252,3 +252,57 @@ def test_a_library_that_is_not_installed_is_named_with_its_extra(tmp_path, monke
     monkeypatch.setitem(sys.modules, "meshio", None)
     with pytest.raises(SurfaceError, match=r"needs meshio .* pip install 'palpate\[import\]'"):
         read_surface(tmp_path / f"a.{ending}")
+
+
+def test_gmshs_first_format_is_read(tmp_path):
+    block = box_mesh((3, 3, 2), SIZE_MM)
+    nodes = "\n".join(f"{k + 1} {x:.6f} {y:.6f} {z:.6f}" for k, (x, y, z) in enumerate(block.points))
+    rows = [f"{k + 1} 4 1 1 4 " + " ".join(str(n + 1) for n in t) for k, t in enumerate(block.tetrahedra)]
+    text = (
+        f"$NOD\n{len(block.points)}\n{nodes}\n$ENDNOD\n$ELM\n{len(rows)}\n" + "\n".join(rows) + "\n$ENDELM\n"
+    )
+    (tmp_path / "old.msh").write_text(text)
+    assert volume(read_surface(tmp_path / "old.msh", "mm")) == pytest.approx(1.2e-4, rel=1e-6)
+    (tmp_path / "torn.msh").write_text(text[: len(text) // 2])
+    with pytest.raises(SurfaceError, match="cannot be read as msh"):
+        read_surface(tmp_path / "torn.msh", "mm")
+
+
+def test_a_surface_that_crosses_itself_is_one_line_without_a_librarys_warning(tmp_path, recwarn):
+    shell = trimesh.creation.box(extents=SIZE_MM)
+    points = np.array(shell.vertices)
+    top = points[:, 2] > 0
+    points[top, 0] *= -1  # the top is mirrored, and the sides cross
+    trimesh.Trimesh(points, shell.faces, process=False).export(tmp_path / "twisted.obj")
+    with pytest.raises(SurfaceError, match="encloses no volume"):
+        read_surface(tmp_path / "twisted.obj", "mm")
+    assert not recwarn.list
+
+
+def named(folder, *boxes):
+    """An OBJ of boxes (name, extents mm, place)."""
+    lines, first = [], 1
+    for name, extents, at in boxes:
+        box = trimesh.creation.box(extents=extents)
+        lines += [f"o {name}", *(f"v {x} {y} {z}" for x, y, z in box.vertices + np.array(at))]
+        lines += [f"f {a + first} {b + first} {c + first}" for a, b, c in box.faces]
+        first += len(box.vertices)
+    (folder / "named.obj").write_text("\n".join(lines) + "\n")
+    return folder / "named.obj"
+
+
+@pytest.mark.parametrize("at", [(0, 0, 0), (90, 0, 0)])
+def test_bodies_inside_or_beside_one_another_are_listed_with_their_volumes(tmp_path, at):
+    found = read_surface(named(tmp_path, ("liver", SIZE_MM, (0, 0, 0)), ("tumour", (10, 10, 10), at)), "mm")
+    assert {p.name: round(1e6 * p.volume_m3, 6) for p in found.parts} == {"liver": 120.0, "tumour": 1.0}
+    assert read_surface(written(tmp_path, "one.obj"), "mm").parts == ()
+
+
+def test_labels_of_cells_are_listed_with_their_volumes(tmp_path):
+    block = box_mesh((4, 4, 4), SIZE_MM)
+    label = (block.points[block.tetrahedra].mean(axis=1)[:, 0] > block.points[:, 0].mean()).astype(int) + 1
+    held = {"tissue": [label]}
+    meshio.Mesh(block.points, [("tetra", block.tetrahedra)], cell_data=held).write(tmp_path / "two.vtu")
+    found = read_surface(tmp_path / "two.vtu", "mm").parts
+    assert [p.name for p in found] == ["tissue 1", "tissue 2"]
+    assert [p.volume_m3 for p in found] == pytest.approx([6e-5, 6e-5], rel=1e-6)

@@ -14,6 +14,7 @@ from palpate.diagnosis.specimen.approach import approach_of
 from palpate.diagnosis.specimen.bench import MachineCycle, Similarity, bench_of
 from palpate.diagnosis.specimen.bench_diagnosis import held_out_rivals
 from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.contact.tip import Tip
 from palpate.mechanics.errors import ContactError, OptionError, RecordingError
 from palpate.reconstruction.machine_curves.relaxation import held_out_relaxation
 from palpate.reconstruction.machine_curves.uniaxial import LAWS, Uniaxial, chosen, fit_law, held_out
@@ -78,7 +79,7 @@ def indentations(count: int, radius: float, modulus: float, seed: int = 0) -> li
 
 @pytest.mark.parametrize(("radius", "modulus"), [(5e-3, 2e4), (10e-6, 300.0)])
 def test_indentations_of_any_scale_give_modulus_and_first_touch(radius, modulus):
-    bench = bench_of(indentations(6, radius, modulus), radius)
+    bench = bench_of(indentations(6, radius, modulus), Tip("sphere", radius))
     assert bench.used.all() and bench.model.presses.sites == 1
     assert bench.modulus_pa == pytest.approx(np.full(6, modulus), rel=0.06)
     assert bench.onset_m == pytest.approx(3e-5 * np.arange(6), abs=0.02 * radius)

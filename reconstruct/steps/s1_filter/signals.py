@@ -3,7 +3,7 @@ may be wrong."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -112,7 +112,10 @@ def filtered_of(
     stated = 0.5 * (recording.force_noise_std_n or 0.0)
     read_noise = white_noise_std(recording.force_on_tool)
     noise = max(read_noise, stated, ripple, 1e-6)
-    white = noise * noise_gain(rate, cutoff_hz)
+    read_hz = read_rate_hz(recording)
+    if read_hz < rate:  # lines between readings hold less noise than was read, of which no low-pass takes any
+        noise = max(noise, 2 * stated)
+    white = noise * noise_gain(read_hz, cutoff_hz)
 
     def less(weight: ToolWeight | None, drift: np.ndarray, still: Callable[[np.ndarray], float]) -> Filtered:
         """With weight and drift (n, 3) taken off; `still` tells the spread of a still tip by what is left."""
@@ -153,6 +156,13 @@ def filtered_of(
 
     raw = recording.force_on_tool - again.force
     return followed(*follow_free_air(t, raw, air, lambda *seen: followed(*seen).touching))
+
+
+def read_rate_hz(recording: Recording) -> float:
+    """Hz, of the force's readings: as stated, where they are slower than the samples."""
+    about = recording.description.get("recording", {})
+    read = about.get("read_rate_hz") if isinstance(about, Mapping) else None
+    return min(float(read), recording.sample_rate_hz) if read else recording.sample_rate_hz
 
 
 def stated_tracing(recording: Recording) -> tuple[float, float] | None:

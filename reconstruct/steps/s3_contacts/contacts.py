@@ -24,7 +24,7 @@ from palpate.reconstruction.steps.s1_filter.noise import (
     noise_gain,
     white_noise_std,
 )
-from palpate.reconstruction.steps.s1_filter.signals import Signals, filtered_of
+from palpate.reconstruction.steps.s1_filter.signals import Signals, filtered_of, read_rate_hz
 from palpate.reconstruction.steps.s2_base import Boundary, BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.cycles import free_air_seen
 from palpate.reconstruction.steps.s3_contacts.first_touch import (
@@ -41,6 +41,8 @@ _DELAY_ROUNDS = 4
 _FAR_S, _UNLIKE_S = 0.04, 0.01
 """A force that reads later than the first is read earlier before touches are looked for, where touches agree
 within the second (standard error): first and last touch alone are found to some 80 ms."""
+_BETWEEN = 12**-0.5
+"""Standard error of a touch that was somewhere between two readings, over the time between them."""
 _KNOWN = 2.0
 """Standard errors that a correction is as large as at least."""
 
@@ -188,6 +190,8 @@ def _tabled(
     delay: s, and its standard error.
     """
     signals, contacts, (delay_s, delay_error_s) = found.spans.filtered.signals, found.touches, delay
+    read_hz = read_rate_hz(recording)
+    between_s = _BETWEEN / read_hz if read_hz < recording.sample_rate_hz else 0.0
     t, first_last = recording.t, found.boundary.interval
     presses = segment_recording(
         recording,
@@ -197,7 +201,10 @@ def _tabled(
             centre=np.array([c.centre for c in contacts]),
             normal=np.array([c.normal for c in contacts]),
             onset_error_m=np.array(
-                [np.hypot(c.onset_error_m, delay_error_s * _speed(signals, c)) for c in contacts]
+                [
+                    np.hypot(c.onset_error_m, _speed(signals, c) * np.hypot(delay_error_s, between_s))
+                    for c in contacts
+                ]
             ),
             until_s=t[[c.end - 1 for c in contacts]],
             kinds=["cycle" if c.unbroken else "press" for c in contacts],

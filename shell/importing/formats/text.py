@@ -26,13 +26,15 @@ _THOUSANDS = re.compile(r"[-+]?\d{1,3}(,\d{3})+(\.\d*)?")
 _FORTRAN = re.compile(r"[-+]?\d*\.?\d*[dD][-+]?\d+")
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d")
 _DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ](\d{1,2}:\d\d.*)")
+_WORD = re.compile(r"[^\W\d_][^,;\t|]*")
+"""A cell that is no number may stand in a column of words: a phase, a sample's name, true or false."""
 _CLOCK = re.compile(r"(\d{1,3}):(\d\d)(?::(\d\d(?:\.\d+)?))?")
 
 
 def read(path: Path) -> list[Table]:
     """The one table of a text file: the longest run of rows of numbers, named by the line before it."""
     raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
-    made = table_of(_decoded(raw).splitlines(), path.name)
+    made = table_of(decoded(raw).splitlines(), path.name)
     if made is None:
         raise RecordingError(f"'{path}' holds no rows of two numbers or more: is it a table?")
     return [made]
@@ -70,7 +72,8 @@ def table_of(
     return Table(name, dict(zip(names, values.T, strict=True)))
 
 
-def _decoded(raw: bytes) -> str:
+def decoded(raw: bytes) -> str:
+    """The text of a file's bytes, which may be cut anywhere."""
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16")
     try:
@@ -105,21 +108,33 @@ def _number(text: str, comma: bool) -> float:
 
 
 def _run(lines: list[str], separator: str | None, comma: bool) -> tuple[int, int]:
-    """First line and number of cells of the longest run of lines of numbers among the first ones."""
-    best, start, width, length = (0, 0), 0, 0, 0
+    """First line and number of numbers of the longest run of rows among the first lines: two numbers or more
+    in each, and words only in columns of words."""
+    best, start, length = (0, 0), 0, 0
+    held: list[bool | None] = []
     for i, line in enumerate(lines[:_LOOK]):
         parts = _split(line, separator)
-        known = [part for part in parts if part.lower() not in _MISSING]
-        if length and (_remark(line) or not any(parts) or (not known and len(parts) == width)):
+        cells = [_is_number(part, comma) for part in parts]
+        alike = len(parts) == len(held)
+        if length and (_remark(line) or not any(parts) or (alike and all(c is None for c in cells))):
             continue
-        fits = len(known) > 1 and all(np.isfinite(_number(part, comma)) for part in known)
-        if fits and length and len(parts) == width:
+        words = [part for part, cell in zip(parts, cells, strict=True) if cell is False]
+        numbers = cells.count(True)
+        fits = numbers > 1 and all(map(_WORD.fullmatch, words))
+        alike = alike and all(a is None or b is None or a == b for a, b in zip(held, cells, strict=True))
+        if fits and length and alike:
             length += 1
+            held = [b if a is None else a for a, b in zip(held, cells, strict=True)]
         else:
-            start, width, length = i, len(parts), int(fits)
-        if fits and length * len(known) > best[1]:
-            best = start, length * len(known)
+            start, length, held = i, int(fits), cells
+        if fits and length * numbers > best[1]:
+            best = start, length * numbers
     return best
+
+
+def _is_number(part: str, comma: bool) -> bool | None:
+    """Whether a cell is a number; None of one that holds nothing."""
+    return None if part.lower() in _MISSING else bool(np.isfinite(_number(part, comma)))
 
 
 def _names(lines: list[str], start: int, separator: str | None, width: int) -> list[str]:
@@ -131,6 +146,7 @@ def _names(lines: list[str], start: int, separator: str | None, width: int) -> l
         named = _split(above[-2].lstrip("#%"), separator)
         if len(named) == width:
             header = [f"{n} ({u.strip('[]()')})" if u else n for n, u in zip(named, header, strict=True)]
+            above.pop()
     if len(header) == width and len(above) > 1 and len({without_unit(h).lower() for h in header}) < width:
         header = _grouped(_split(above[-2].lstrip("#%"), separator), header)
     if len(header) != width or all(re.fullmatch(r"[-+.\d,eE]*", name) for name in header):

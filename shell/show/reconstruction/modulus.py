@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_FLAT = 0.01
+"""Of the greatest spread of the places: less is no direction that a slope is read along."""
 SIDE = 0.3  # |n . support normal| below this: a press on the side
 
 
@@ -78,9 +80,22 @@ def over_surface(model: Model, values: np.ndarray) -> np.ndarray:
     used = np.isfinite(values)
     scale = np.linalg.norm(np.ptp(points, axis=0))
     centre, size = np.median(values[used]), max(float(np.std(values[used])), 1e-12)
-    smooth = RBFInterpolator(points[used] / scale, (values[used] - centre) / size, smoothing=1e-2)
-    field = centre + size * smooth(felt_surface(model).points / scale)
+    at, axes = points[used], _spread_axes(points[used])
+    felt = felt_surface(model).points
+    if not len(axes):
+        return np.full(len(felt), centre)
+    smooth = RBFInterpolator(at @ axes.T / scale, (values[used] - centre) / size, smoothing=1e-2)
+    field = centre + size * smooth(felt @ axes.T / scale)
     return np.clip(field, values[used].min(), values[used].max())
+
+
+def _spread_axes(points: np.ndarray) -> np.ndarray:
+    """(k, 3) the directions along which points (n, 3) lie apart: two for places in one plane, one on a line;
+    only those that n places can tell a slope along."""
+    centred = points - points.mean(axis=0)
+    _, spread, axes = np.linalg.svd(centred, full_matrices=False)
+    kept = axes[spread > _FLAT * max(float(spread[0]), 1e-300)] if spread[0] > 0 else axes[:0]
+    return kept[: len(np.unique(points, axis=0)) - 1]
 
 
 def undamped_figure(models: dict[str, Model]) -> Figure:

@@ -103,6 +103,8 @@ def _made(result: Reconstruction) -> say.Story:
     """How it came about, in a terminal's lines."""
     exploration, surface, mesh = result.exploration, result.surface, result.model.mesh
     not_used = _not_used(result)
+    used = len(result.model.presses)
+    yield say.TextLine(f"contacts: {used + len(not_used)} found, {used} used")
     if not_used:
         yield say.TextLine(f"{counted(len(not_used), 'contact')} not used:")
     yield from (say.Detail(f"at {t:.2f} s: {reason}", on=say.TEXT) for t, reason in not_used[:_NAMED])

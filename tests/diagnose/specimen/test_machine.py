@@ -13,9 +13,11 @@ from palpate.diagnosis.specimen.machine_compliance import machine_of, way_of
 from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.contact.tip import Tip
 from palpate.show.material import in_words
 
 RADIUS = 0.005
+TIP = Tip("sphere", RADIUS)
 
 
 def curves(modulus: float, stiffness: float, count: int = 3, slope: float = 0.0) -> list[MachineCycle]:
@@ -39,7 +41,7 @@ def stiffness_for(modulus: float, share: float) -> float:
 
 
 def material(given: list[MachineCycle]):
-    tests = MachineTests("indentation", curves=tuple(given), tip_radius_m=RADIUS)
+    tests = MachineTests("indentation", curves=tuple(given), tip=TIP)
     return material_of(tests, [c.name for c in given], fast=True)
 
 
@@ -62,7 +64,7 @@ def test_a_rigid_machine_is_not_named_whatever_the_law(law):
         dent = np.concatenate([np.linspace(-0.4e-3, 0, 80)[:-1], np.linspace(0, 0.3 * RADIUS, 400)])
         force = np.asarray(dent_law(law).force(np.maximum(dent, 0), 5e4, 0.49, RADIUS))
         ways.append(way_of(dent, force + 0.003 * force.max() * rng.standard_normal(len(dent)), 0.0))
-    assert machine_of(ways, 0.49, RADIUS, 4e4) is None
+    assert machine_of(ways, 0.49, TIP, 4e4) is None
 
 
 def test_a_slope_of_free_air_is_taken_off_and_said():

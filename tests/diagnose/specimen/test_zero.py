@@ -15,8 +15,10 @@ from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.specimen.zero import late_contact
 from palpate.mechanics.contact.dent import dent_law
+from palpate.mechanics.contact.tip import Tip
 
 RADIUS, MODULUS = 0.005, 3e4
+TIP = Tip("sphere", RADIUS)
 ANSWERS: dict[tuple, Material] = {}
 
 
@@ -37,7 +39,7 @@ def material(*curves: MachineCycle) -> Material:
     """The answer to some curves; tests that ask the same share it."""
     names = tuple((id(c), c.name) for c in curves)
     if names not in ANSWERS:
-        tests = MachineTests("indentation", curves=curves, tip_radius_m=RADIUS)
+        tests = MachineTests("indentation", curves=curves, tip=TIP)
         ANSWERS[names] = material_of(tests, [c.name for c in curves], fast=True)
     return ANSWERS[names]
 
@@ -55,7 +57,7 @@ def test_a_late_contact_is_said_and_the_modulus_is_right(count):
 @pytest.mark.parametrize("begins", [-0.2, 0.0])
 def test_a_wrong_zero_is_no_late_contact(begins):
     given = [curve(k, begins=begins, zero=0.2) for k in range(3)]
-    assert late_contact(given, 0.49, RADIUS) == (given, None)
+    assert late_contact(given, 0.49, TIP) == (given, None)
 
 
 def test_a_bias_is_said_with_the_modulus_that_it_would_make():

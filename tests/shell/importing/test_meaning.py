@@ -10,7 +10,7 @@ import pytest
 
 import palpate as pp
 from palpate import cli
-from palpate.importing.curves import stated_radius
+from palpate.importing.headers import header_of
 from palpate.importing.meaning import (
     LEAST_ODDS,
     Unclear,
@@ -179,7 +179,7 @@ def test_a_unit_that_is_said_nowhere_is_taken_only_where_it_is_sure(tmp_path):
 )
 def test_the_probes_radius_is_read_from_the_files_own_text(tmp_path, text, radius):
     (tmp_path / "a.txt").write_text(f"Operator: x\n{text}\nt;z;f\n1;2;3\n")
-    assert stated_radius(tmp_path / "a.txt") == (None if radius is None else pytest.approx(radius))
+    assert header_of(tmp_path / "a.txt").radius_m == (None if radius is None else pytest.approx(radius))
 
 
 def test_arrays_get_the_checks_of_files():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from palpate.importing.curves import stated_radius
+from palpate.importing.headers import header_of
 from palpate.importing.tables import read_tables
 from palpate.mechanics.errors import RecordingError
 from tests.support.containers import WRITERS, Content
@@ -28,7 +28,7 @@ def test_a_sheet_with_its_units_in_any_form_is_a_recording(tmp_path, kind, form)
     WRITERS[kind](path, CONTENT, form, False)
     read = pp.read_table(path, tip_radius_m=0.004)
     assert np.allclose(read.position, PLACE, atol=1e-9) and np.allclose(read.force_on_tool, FORCE, atol=1e-9)
-    assert stated_radius(path) == pytest.approx(0.004)
+    assert header_of(path).radius_m == pytest.approx(0.004)
 
 
 def test_a_sheet_without_numbers_is_one_line(tmp_path):
