@@ -139,6 +139,16 @@ def given_model(model: Any, said: Mapping[str, Any], flag: str = "--model") -> A
     return given_scene(model, said) if flags or is_surface_file(Path(model)) else model
 
 
+def names_scene(model: Any) -> bool:
+    """Whether what is touched is a scene, and not an object by itself: a MODEL, a recording, a surface's file."""
+    from palpate.scenes.scene import Scene, load_scene
+
+    if not isinstance(model, str | Path):
+        return isinstance(model, Scene)
+    scene = load_scene(model)
+    return scene.kind == "phantom" or Path(scene.source) != Path(model).resolve()
+
+
 def with_friction(options: RenderOptions, scene: Scene) -> RenderOptions:
     """The renderers' options with the scene file's friction, where they have none of their own."""
     return options if options.friction is not None else replace(options, friction=scene.friction)

@@ -31,6 +31,14 @@ def story(result: Curve, written: str | None = None) -> say.Story:
     force = ", ".join(f"{round(float(f), 3) + 0.0:g}" for f in result.force_at(depth))
     normal = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in np.asarray(result.normal))
     made = result.renderer.model
+    if result.on_support:
+        low, high = (", ".join(f"{v:.3g}" for v in f(made.mesh.points, axis=0)) for f in (np.min, np.max))
+        yield say.Headline(
+            f"this pressed the support, not the object: {result.peak_force_n:.3g} N at most are the support's"
+        )
+        yield say.Detail(f"the object lies within ({low}) to ({high}) m: aim `--at` there")
+        yield say.Next(["press the object through its middle: the same without `--at`"])
+        return
     yield say.Headline(
         f"{result.renderer.name}: {result.peak_force_n:.3g} N at most; {mm(depth)} deep the force on the "
         f"tool is ({force}) N"
@@ -65,6 +73,7 @@ def solved_rows(depth: str, rows: Iterable[tuple[float, float, float, float]]) -
 
 
 KEYS: tuple[say.Key, ...] = (
+    "on_support",
     ("renderer", lambda result: _renderer(result).name),
     "normal",
     ("depth_m", lambda result: result.depth.max()),
