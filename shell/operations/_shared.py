@@ -140,7 +140,7 @@ def given_model(model: Any, said: Mapping[str, Any], flag: str = "--model") -> A
 
 
 def names_scene(model: Any) -> bool:
-    """Whether what is touched is a scene, and not an object by itself: a MODEL, a recording, a surface's file."""
+    """Whether what is touched is a scene, not an object by itself: a MODEL, a recording, a surface's file."""
     from palpate.scenes.scene import Scene, load_scene
 
     if not isinstance(model, str | Path):
