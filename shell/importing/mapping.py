@@ -157,7 +157,8 @@ class Column:
 
 _AXIS = {"x": ("x", "0"), "y": ("y", "1"), "z": ("z", "2")}
 _BEFORE = {
-    "position": "pos position p tcp tip tippos tipposition tcppose tcpposition toolposition actualtcppose"
+    "position": "pos position p tcp tcpp eep toolp tip tippos tipposition tcppose tcpposition toolposition"
+    " actualtcppose"
     " pose poseposition poseposeposition translation transformtranslation ee eepos probe probepos"
     " loc location flange flangeposition flangepos weg",
     "force": "f force forces wrenchforce ft tcpforce actualtcpforce wrench load sensorforce forcetorque"

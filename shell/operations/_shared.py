@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentTypeError
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from palpate.mechanics.disk.surface_files import UNITS, is_surface_file
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import pairs
 from palpate.operations._declare import argument, option
-from palpate.operations._to_argparse import natural
+from palpate.operations._to_argparse import finite, natural
 from palpate.render.registry import names, simulator_names
 
 if TYPE_CHECKING:
@@ -80,6 +81,24 @@ def columns_option(roles: str, **more: Any) -> Mapping[str, Any]:
     """--column ROLE=NAME, repeatable; in Python {role: name}."""
     words = f"which column has which role (repeatable): {roles}"
     return option(words, flag="--column", metavar="ROLE=NAME", count="repeat", **more)
+
+
+def seconds(text: str, flag: str) -> float:
+    """A number of seconds that was typed; raises OptionError for no finite one."""
+    try:
+        return finite(text)
+    except (ValueError, ArgumentTypeError) as error:
+        raise OptionError(f"{flag}: '{text}' is no finite number of seconds") from error
+
+
+def offset_option() -> Mapping[str, Any]:
+    """--offset, of two files with a clock each."""
+    words = "offset of the force's clock, or auto (cross-correlation)"
+    return option(words, unit="s", metavar="NUMBER", parse=_offset, advanced=True)
+
+
+def _offset(text: str) -> float | str:
+    return text if text == "auto" else seconds(text, "--offset")
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,12 @@ def press(
     call.exit_code = int(curve.on_support and not names_scene(model))
     if expected is not None:
         call.then(partial(_compared, curve, expected, tolerance, call))
-    call.following = [partial(next_lines, curve, written=output)]
+    touched = None
+    if isinstance(model, str | Path):
+        from palpate.operations._written import typed
+
+        touched = typed("touch", {"scene": model, **file})
+    call.following = [partial(next_lines, curve, written=output, touched=touched)]
     return curve
 
 

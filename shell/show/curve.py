@@ -12,7 +12,7 @@ from palpate.render.base import Renderer
 from palpate.render.force_error import said
 from palpate.render.press import Curve
 from palpate.show import story as say
-from palpate.show.page import file_words
+from palpate.show.page import feel_step
 from palpate.words import kpa, mm
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from palpate.render.exact import SolvedPlace
 
 
-def story(result: Curve, written: str | None = None) -> say.Story:
-    """How it answers the press. written: the curve's file."""
+def story(result: Curve, written: str | None = None, touched: str | None = None) -> say.Story:
+    """How it answers the press. written: the curve's file; touched: the command that touches it."""
     depth = float(result.depth.max())
     if result.renderer is None:
         yield say.Headline(f"a curve that was read: {result.peak_force_n:.4g} N at most, {mm(depth)} deep")
@@ -51,11 +51,11 @@ def story(result: Curve, written: str | None = None) -> say.Story:
         yield say.Detail(words)
     if result.exact is not None:
         yield from _solved(result.exact)
-    model = file_words(made.path, "MODEL")
     later = "see whether it stays so: press with `-o CURVE.csv`, later with `--expect CURVE.csv`"
     if written is not None:
         later = f"see later whether it stays so: the same press with `--expect {written}`"
-    yield say.Next([f"feel it: `palpate touch {model}`", later])
+    feel = f"feel it: `{touched}`" if touched else None
+    yield say.Next([feel or feel_step(made.path, "palpate model FILE -o MODEL"), later])
 
 
 def _solved(exact: SolvedPlace) -> say.Story:

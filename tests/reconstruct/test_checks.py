@@ -78,7 +78,7 @@ def test_what_is_found_says_where_and_how_sure(cylinder):
 
 
 def test_what_is_less_than_a_step_off_a_straight_line_is_no_spike_and_more_is(cylinder):
-    """A robot's commanded way has no noise: off its straight lines any micrometre is millions of deviations."""
+    """A robot's commanded way has no noise: off its lines any micrometre is millions of deviations."""
     recording = cylinder[0]
     knots = recording.t[::500]
     lines = np.column_stack([np.interp(recording.t, knots, x[::500]) for x in recording.position.T])
