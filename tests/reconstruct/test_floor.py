@@ -13,7 +13,8 @@ from palpate.reconstruction.methods import ReconstructOptions
 from palpate.reconstruction.pipeline import reconstruct_fully
 from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors, held_out, modulus_by_others
 from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions
-from palpate.show import next_lines
+from palpate.show import next_lines, story_of
+from palpate.show.story import Headline
 
 from .flat_contact import points
 
@@ -52,6 +53,8 @@ def test_the_first_line_says_who_predicts_better(varied):
     lost = dataclasses.replace(varied, held_out=of_one_modulus(varied))
     first, held = lost.lines()[0], lost.as_json()
     assert first.startswith("not reliable") and held["beaten_by"] in first and not lost.predicts
+    headlines = [b.text for b in story_of(lost) if isinstance(b, Headline) and b.on != "text"]
+    assert headlines and all(len(text.split()) <= 20 and "--" not in text for text in headlines)
     assert held["held_out_floor_rmse_n"] < held["held_out_rmse_n"]
     assert not any("--field auto" in step for step in next_lines(lost)), "it was asked for here"
 
