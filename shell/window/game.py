@@ -78,10 +78,11 @@ class Game:
             last = self.answers[-1]
             first = (
                 f"{mm(last.off_m, '.1f')} from the nodule after {last.seconds:.0f} s by "
-                f"{last.renderer}: {last.score:.0f} of 100 points. Touch anew to go on, Tab for another renderer."
+                f"{last.renderer}: {last.score:.0f} of 100 points. Touch anew to go on, Tab: another renderer."
             )
         else:
-            first = f"A nodule is hidden: press {mm(PRESS_M, 'g')} deep at many places, and compare the N/m above this box."
+            deep = mm(PRESS_M, "g")
+            first = f"A nodule is hidden: press {deep} deep at many places, and compare the N/m above."
         names = sorted({a.renderer for a in self.answers})
         scores = [
             f"{name} {np.mean([a.score for a in self.answers if a.renderer == name]):.0f} of 100 points in "
