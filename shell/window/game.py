@@ -78,7 +78,7 @@ class Game:
             last = self.answers[-1]
             first = (
                 f"{mm(last.off_m, '.1f')} from the nodule after {last.seconds:.0f} s by "
-                f"{last.renderer}: {last.score:.0f} of 100 points. Touch anew to go on, Tab: another renderer."
+                f"{last.renderer}: {last.score:.0f} of 100 points. Touch anew to go on; Tab: next renderer."
             )
         else:
             deep = mm(PRESS_M, "g")
