@@ -3,6 +3,11 @@
 Every message says what came, what is allowed and what to do, in one line.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
 
 class PalpateError(Exception):
     """Base of every error that a user can mend; the command line prints it and exits with 2."""
@@ -17,7 +22,12 @@ class FileError(PalpateError, OSError):
 
 
 class RecordingError(PalpateError):
-    """A recording is unreadable, incomplete, or physically impossible."""
+    """A recording is unreadable, incomplete, or physically impossible. said: what `palpate open` is to be
+    told, by name, so that it is read as it may be meant; empty where nothing is likely."""
+
+    def __init__(self, words: str = "", said: Mapping[str, Any] | None = None) -> None:
+        super().__init__(words)
+        self.said = said or {}
 
 
 class ContactError(PalpateError):

@@ -29,6 +29,7 @@ from palpate.render.surface.contact_surface import SurfaceArrays
 from palpate.render.surface.walking import foot
 
 if TYPE_CHECKING:
+    from palpate.mechanics.model.model import Model
     from palpate.render.exact import ExactPlaces, SolvedPlace
 
 COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
@@ -46,10 +47,11 @@ class Curve(Result):
     tool.
 
     Depth is travel along -n since first touch, 0 before it. normal: (3,) outward at first touch; renderer,
-    tip_radius_m: what it was pressed with; None for a curve that was read. unsettled: samples whose force did
-    not settle, and that hold the one before. exact: the place as it was solved,
-    where the force is by that. `plot`: force along the normal,
-    and its length, over depth. `show`: the object as it is deformed at the deepest, with tip and force.
+    tip_radius_m: what it was pressed with; None for a curve that was read. on_support: the first contact is
+    the support, and no force is the object's. unsettled: samples whose force did not settle, and that hold
+    the one before. exact: the place as it was solved, where the force is by that. `plot`: force along the
+    normal, and its length, over depth. `show`: the object as it is deformed at the deepest, with tip and
+    force.
     """
 
     t: np.ndarray
@@ -60,12 +62,13 @@ class Curve(Result):
     renderer: Renderer | None = None
     tip_radius_m: float | None = None
     exact: SolvedPlace | None = None
+    on_support: bool = False
     unsettled: int = 0
 
     @cached_property
     def error_figures(self) -> dict[str, float]:
         """What the force at the deepest may be off by, N: keys of render.force_error; {} where unknown."""
-        if self.renderer is None or self.tip_radius_m is None:
+        if self.renderer is None or self.tip_radius_m is None or self.on_support:
             return {}
         part = slice(self.deepest, self.deepest + 1)
         errors = force_errors(self.renderer, self.position[part], self.force[part], self.tip_radius_m)
@@ -136,19 +139,21 @@ class Stroke:
 
 def press(
     touched: Renderer | TouchScene,
-    at: np.ndarray,
+    at: np.ndarray | None,
     direction: np.ndarray,
     stroke: Stroke,
     tip_radius_m: float | None = None,
 ) -> Curve:
-    """Press along `direction` (3,) with the tip's centre aimed at the point `at` (3,) m, device frame.
+    """Press along `direction` (3,) with the tip's centre aimed at the point `at` (3,) m, device frame; None:
+    at the object's centre of volume.
 
     touched: a scene, or a renderer, which stands on its model's support. Raises OptionError where the line
     misses both, enters the object through its base, grazes what it meets (more than 80 degrees off the
     normal), or starts inside the object or under the support.
     """
     scene = scene_of(touched)
-    at, direction = np.asarray(at, dtype=float), np.asarray(direction, dtype=float)
+    at = centre_of_volume(scene.model) if at is None else np.asarray(at, dtype=float)
+    direction = np.asarray(direction, dtype=float)
     length = float(np.linalg.norm(direction))
     if not length > 0 or not np.isfinite(at).all() or not np.isfinite(length):
         raise OptionError(f"direction is {direction.tolist()}; it must be a finite vector that is not 0")
@@ -162,7 +167,7 @@ def press(
             f"depth is {stroke.depth_m:g} m, and the object is {height:.4g} m high: "
             "press less deep (in metres)"
         )
-    touch, normal = first_touch(scene, at, direction, radius)
+    touch, normal, on_support = first_touch(scene, at, direction, radius)
     steepness = -float(normal @ direction)
     if steepness < _GRAZING:
         raise OptionError(
@@ -177,7 +182,16 @@ def press(
     force = scene.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), step_s))
     depth = np.maximum(along * steepness, 0.0)
     unsettled = int(state.touch.unsettled[0])
-    return Curve(t, position, depth, force[:, 0], normal, scene.renderer, radius, unsettled=unsettled)
+    return Curve(
+        t, position, depth, force[:, 0], normal, scene.renderer, radius, on_support=on_support,
+        unsettled=unsettled,
+    )  # fmt: skip
+
+
+def centre_of_volume(model: Model) -> np.ndarray:
+    """(3,) m, device frame."""
+    corners = model.mesh.points[model.mesh.tetrahedra[:, :4]]
+    return np.average(corners.mean(axis=1), axis=0, weights=model.mesh.volumes)
 
 
 def check_start(scene: TouchScene, start: np.ndarray, touch: np.ndarray, radius: float) -> None:
@@ -223,9 +237,9 @@ def solved(curve: Curve, exact: ExactPlaces) -> Curve:
 
 def first_touch(
     scene: TouchScene, at: np.ndarray, direction: np.ndarray, radius: float
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, bool]:
     """Centre (3,) m of a sphere that comes along `direction` (3, unit) through `at` when it first touches the
-    object or the support beside it, and the outward normal (3,) there.
+    object or the support beside it, the outward normal (3,) there, and whether it is the support.
 
     Raises OptionError where the line misses both or first meets the base.
     """
@@ -239,7 +253,8 @@ def first_touch(
             f"not meet the touchable surface (object within {np.round(low, 4).tolist()} to "
             f"{np.round(high, 4).tolist()} m), nor a support next to it"
         )
-    return min((found for found in (on_object, beside) if found is not None), key=lambda f: f[0] @ direction)
+    found = [(*each, each is beside) for each in (on_object, beside) if each is not None]
+    return min(found, key=lambda f: f[0] @ direction)
 
 
 def _on_support(

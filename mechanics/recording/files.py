@@ -103,7 +103,12 @@ def read_samples(path: Path) -> dict[str, np.ndarray]:
     return dict(zip(wanted, values.T, strict=True))
 
 
-_UNITS = {"micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
+_UNITS = {
+    "micrometres": ("um", 1e-6),
+    "millimetres": ("mm", 1e-3),
+    "centimetres": ("cm", 1e-2),
+    "inches": ("in", 0.0254),
+}
 
 
 def check_plausible(t: np.ndarray, rate: float, position: np.ndarray, force: np.ndarray) -> None:
@@ -114,11 +119,12 @@ def check_plausible(t: np.ndarray, rate: float, position: np.ndarray, force: np.
     block = min(100, len(t) - 1)
     read = block / float(np.median(t[block:] - t[:-block]))
     if not _near(read, rate):
-        units = {"milliseconds": 1e3, "microseconds": 1e6}
-        like = next((unit for unit, scale in units.items() if _near(read * scale, rate)), "")
+        units = {"milliseconds": ("ms", 1e3), "microseconds": ("us", 1e6)}
+        like = next((unit for unit, (_, scale) in units.items() if _near(read * scale, rate)), "")
         raise RecordingError(
             f"t steps by {1 / read:.4g}, in seconds {read:.4g} Hz, where sample_rate_hz is {rate:g}: "
-            + (f"these look like {like}; write t in seconds" if like else "state the true rate")
+            + (f"these look like {like}; write t in seconds" if like else "state the true rate"),
+            {"units": {"time": units[like][0]}} if like else {"rate_hz": float(f"{read:.4g}")},
         )
     if (t[-1] - t[0]) * max(rate, read) > MOST_SAMPLES:
         gap = int(np.argmax(np.diff(t)))
@@ -129,11 +135,12 @@ def check_plausible(t: np.ndarray, rate: float, position: np.ndarray, force: np.
         )
     path, extent = EXPLORATION["extent"], float(np.ptp(position, axis=0).max())
     if extent > path.high:
-        guesses = [u for u, s in _UNITS.items() if path.likely[0] <= extent * s <= path.likely[1]]
+        guesses = [u for u, (_, s) in _UNITS.items() if path.likely[0] <= extent * s <= path.likely[1]]
         like = f"these look like {' or '.join(guesses)}; " if guesses else ""
         raise RecordingError(
             f"the tip's path is {extent:.4g} m across: {like}x, y, z must be metres, at most "
-            f"{path.high:g} m across"
+            f"{path.high:g} m across",
+            {"units": {"position": _UNITS[guesses[0]][0]}} if guesses else {},
         )
     loud = np.flatnonzero((np.abs(force) > LARGEST_N).any(axis=1))
     if len(loud):

@@ -245,7 +245,10 @@ def _spiky(data: Samples) -> Iterator[Finding]:
     for k in range(6):
         values = data.values[:, k]
         off = values - median_filter(values, size=width, mode="nearest")
-        scale = max(spread_about_zero(off), float(data.step[k]), 1e-12)
+        # along a straight line without noise no spread is left: a spike leaves by more than a usual step
+        moves = np.abs(np.diff(values))
+        usual = float(np.median(moves[moves > 0])) if moves.any() else np.inf
+        scale = max(spread_about_zero(off), float(data.step[k]), usual / _SPIKES)
         away, count = label((np.abs(off) > _SPIKES * scale) & ~cut)
         if not count:
             continue

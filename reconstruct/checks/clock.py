@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from palpate.mechanics.recording.segments import runs
-from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.finding import ALL_THE_SAME, Finding, Way
 from palpate.reconstruction.checks.samples import Samples
 
 _TOLD = 0.02
@@ -45,6 +45,7 @@ def _rate(data: Samples) -> Iterator[Finding]:
         np.inf,
         (float(data.recording.t[0]), float(data.recording.t[-1])),
         ("t",),
+        (Way("read it by its own times", {"rate_hz": float(f"{own:.4g}")}), ALL_THE_SAME),
     )
 
 
@@ -110,6 +111,10 @@ def _jitter(data: Samples) -> Iterator[Finding]:
         np.inf,
         (middle - 10 / data.rate_hz, middle + 10 / data.rate_hz),
         ("t",),
+        (
+            Way("bring it to an even grid by its times", {"rate_hz": float(f"{data.rate_hz:.4g}")}),
+            ALL_THE_SAME,
+        ),
     )
 
 

@@ -7,8 +7,8 @@ What came out: a modulus that a soft object can have, an interval, and a force t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,24 @@ GRAVE = 0.25
 
 
 @dataclass(frozen=True)
+class Way:
+    """A way to go on with the same file. says: where it is right. options: of `palpate open`, by name; a
+    column is named by its role, '-fz' is its negative."""
+
+    says: str
+    options: Mapping[str, Any]
+
+
+OF_A_KNOWN_OBJECT = (
+    Way("the object's shape is a file", {"shape": "SHAPE.stl", "unit": "mm"}),
+    Way("it is a slab, here 20 mm thick", {"slab_m": 0.02}),
+    Way("it is flat, deep and wide compared with every contact", {"half_space": True}),
+)
+"""Ways that need no traced base."""
+ALL_THE_SAME = Way("go on all the same", {"force": True})
+
+
+@dataclass(frozen=True)
 class Finding:
     """One thing that is wrong with a recording.
 
@@ -35,6 +53,7 @@ class Finding:
     statistic. todo: what to do. error: relative standard error that it adds to the modulus, infinite where
     nothing can be said. decades: -log10 of the probability on a sound recording, or log10 of the odds.
     stretch: (start, end) s of the recording as it is, worth a look. channels: columns of the recording.
+    ways: to go on with the same file.
     """
 
     name: str
@@ -45,6 +64,7 @@ class Finding:
     decades: float
     stretch: tuple[float, float] | None = None
     channels: tuple[str, ...] = ()
+    ways: tuple[Way, ...] = (ALL_THE_SAME,)
 
     @property
     def grave(self) -> bool:
@@ -67,6 +87,7 @@ class Finding:
             "decades": self.decades,
             "stretch_s": self.stretch,
             "channels": self.channels,
+            "ways": [{"says": way.says, "options": dict(way.options)} for way in self.ways * self.grave],
         }
 
 
@@ -93,13 +114,16 @@ class Checkup(Result):
 
     findings: each with name, saw, sure, todo, grave, error (relative, of the modulus), stretch (s), channels.
     seen: what was measured on the way: words with the unit, value, what is usual (NaN where nothing is).
-    full: whether the modulus was looked at too. `plot`: force over time, stretches shaded. `show`: the path.
+    full: whether the modulus was looked at too. opened: what `palpate open` was given, by name, and under
+    "names" the column of each role; {} for a recording of its own. `plot`: force over time, stretches
+    shaded. `show`: the path.
     """
 
     recording: Recording
     findings: tuple[Finding, ...]
     seen: tuple[tuple[str, float, float], ...] = ()
     full: bool = False
+    opened: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def grave(self) -> tuple[Finding, ...]:

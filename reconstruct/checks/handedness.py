@@ -15,7 +15,7 @@ from itertools import permutations, product
 import numpy as np
 
 from palpate.mechanics.presses.repeats import SITE_M, sites_of
-from palpate.reconstruction.checks.finding import SURE_ODDS, Finding
+from palpate.reconstruction.checks.finding import ALL_THE_SAME, SURE_ODDS, Finding, Way
 from palpate.reconstruction.checks.samples import Samples
 
 _LEAST_SITES = 5
@@ -63,9 +63,10 @@ def handedness(data: Samples) -> Iterator[Finding]:
     worst = int(np.flatnonzero(good)[np.argmax(off)])
     stretch = data.touches.start[worst], data.touches.end[worst] - 1
     name, words, todo = _described(best)
+    stated = dict(data.recording.description.get("recording") or {}).get("force_on", "tool")
+    whose = "tool" if stated == "object" else "object"
     if best == "-x -y -z":
-        stated = dict(data.recording.description.get("recording") or {}).get("force_on", "tool")
-        todo = _other_side("tool" if stated == "object" else "object")
+        todo = _other_side(whose)
     at = [float(data.recording.t[int(i)]) for i in stretch]
     yield Finding(
         name,
@@ -77,7 +78,19 @@ def handedness(data: Samples) -> Iterator[Finding]:
         decades,
         (at[0], at[1]),
         _FORCE,
+        _ways(best, whose),
     )
+
+
+def _ways(best: str, whose: str) -> tuple[Way, ...]:
+    """Read as it behaves; whose: the body of the other sign."""
+    if best == "abs":
+        return (ALL_THE_SAME,)
+    if best == "-x -y -z":
+        return (Way(f"it is the force on the {whose}", {"force_on": whose}), ALL_THE_SAME)
+    read = {f"f{part[-1]}": f"{part[:-1]}f{axis}" for axis, part in zip("xyz", best.split(), strict=True)}
+    columns = {role: name for role, name in sorted(read.items()) if role != name}
+    return (Way("the columns of the force are so", {"columns": columns}), ALL_THE_SAME)
 
 
 def _presses(data: Samples) -> np.ndarray:

@@ -16,7 +16,13 @@ from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.checks.air import air, delay
 from palpate.reconstruction.checks.channels import channels
 from palpate.reconstruction.checks.clock import clock
-from palpate.reconstruction.checks.finding import Finding, ReconstructionOutcome, outcome
+from palpate.reconstruction.checks.finding import (
+    OF_A_KNOWN_OBJECT,
+    Finding,
+    ReconstructionOutcome,
+    Way,
+    outcome,
+)
 from palpate.reconstruction.checks.handedness import handedness
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
@@ -84,9 +90,11 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     return looked_at(recording)[0]
 
 
-def looked_at(recording: Recording) -> tuple[tuple[Finding, ...], Seen]:
-    """As `check`, and what the checks measure on the way."""
-    known = stated_geometry(recording, GeometryOptions()).known
+def looked_at(
+    recording: Recording, geometry: GeometryOptions | None = None
+) -> tuple[tuple[Finding, ...], Seen]:
+    """As `check`, and what the checks measure on the way. geometry: said beside the recording's own."""
+    known = stated_geometry(recording, geometry or GeometryOptions()).known
     samples = checked_samples(recording, by_hand=not known)
     found = samples.found
     if not (known or any(f.grave for f in found)):
@@ -101,9 +109,9 @@ def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[Findin
             recording, lambda base: explore(recording, boundary=base, spans=samples.spans)
         )
     except NoBaseError as error:
-        return ordered([*found, _refused(recording, "no base", error)])
+        return ordered([*found, _refused(recording, "no base", error, OF_A_KNOWN_OBJECT)])
     except ContactError as error:
-        return ordered([*found, _refused(recording, "no presses", error)])
+        return ordered([*found, _refused(recording, "no presses", error, ())])
     return ordered([*found, *checked_presses(exploration)])
 
 
@@ -178,16 +186,18 @@ def _too_short(recording: Recording) -> Finding:
         np.inf,
         np.inf,
         (float(recording.t[0]), float(recording.t[-1])),
+        ways=OF_A_KNOWN_OBJECT,
     )
 
 
-def _refused(recording: Recording, name: str, error: ContactError) -> Finding:
+def _refused(recording: Recording, name: str, error: ContactError, ways: tuple[Way, ...]) -> Finding:
     return Finding(
         name,
         str(error),
         "reconstruction stops there",
-        "see docs/reference/recording-format.md for what a recording holds",
+        "say what is known of the object" if ways else "press at more places, each from the air and back",
         np.inf,
         np.inf,
         (float(recording.t[0]), float(recording.t[-1])),
+        ways=ways,
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from palpate.mechanics.statistics import spread_about_zero, weighted_median
-from palpate.reconstruction.checks.finding import Finding
+from palpate.reconstruction.checks.finding import ALL_THE_SAME, OF_A_KNOWN_OBJECT, Finding
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s3_contacts.on_support import supported
 
@@ -19,6 +19,9 @@ _PRESS_S, _FEEBLE = 0.5, 0.2
 """A contact that stays below this share of the usual press's force in its first half second was none."""
 _STEEP = 0.85
 """A wall's normal rises from the horizontal by less than this cosine."""
+
+
+_WITHOUT_BASE = (*OF_A_KNOWN_OBJECT, ALL_THE_SAME)
 
 
 def support(measured: Measured) -> Iterator[Finding]:
@@ -56,6 +59,7 @@ def _below(measured: Measured) -> Iterator[Finding]:
         np.inf,
         (float(recording.t[a]), float(recording.t[b])),
         ("x", "y", "z"),
+        _WITHOUT_BASE,
     )
 
 
@@ -77,6 +81,7 @@ def _hollow(measured: Measured) -> Iterator[Finding]:
         np.inf,
         (float(t[a]), float(t[b - 1])),
         ("x", "y", "z"),
+        _WITHOUT_BASE,
     )
 
 
@@ -126,6 +131,7 @@ def _size(measured: Measured) -> Iterator[Finding]:
         float(min(0.5 * (centre / error) ** 2 / np.log(10), 300)),
         (float(t[a]), float(t[b - 1])),
         ("x", "y", "z"),
+        _WITHOUT_BASE,
     )
 
 

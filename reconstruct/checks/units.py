@@ -17,7 +17,7 @@ from scipy.stats import norm
 from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.statistics import weighted_quantile
-from palpate.reconstruction.checks.finding import SURE_ODDS, Finding, p_words, sure
+from palpate.reconstruction.checks.finding import ALL_THE_SAME, SURE_ODDS, Finding, Way, p_words, sure
 from palpate.reconstruction.checks.samples import Samples, Units
 
 READINGS = {
@@ -31,6 +31,8 @@ READINGS = {
 }  # fmt: skip
 """What the samples may be, and how many of it make the SI unit, which comes first."""
 COLUMNS = {"time": ("t",), "position": ("x", "y", "z"), "force": ("fx", "fy", "fz"), "tip": ("tip_radius_m",)}
+_UNITS = {"inches": "in", "grams": "gf"}
+_NO_UNITS = ("m divided by 10", "m divided by 100", "dm", "km", "kN")
 _SI = {"time": "seconds", "position": "metres", "force": "newtons", "tip": "metres"}
 _SHOWN = 3
 _LEAST_M = 1e-7
@@ -126,7 +128,18 @@ def _finding(data: Samples, kind: str, name: str, odds: float, seen: dict[str, f
         float(np.log10(odds)),
         (float(data.recording.t[0]), float(data.recording.t[-1])),
         columns,
+        _ways(data, kind, name),
     )
+
+
+def _ways(data: Samples, kind: str, name: str) -> tuple[Way, ...]:
+    """Read in those units, where a table can be."""
+    if kind == "tip":
+        radius = data.recording.tip_radius_m / READINGS[kind][name]
+        return (Way(f"the radius is {1e3 * radius:.3g} mm", {"tip_radius_m": radius}), ALL_THE_SAME)
+    if name in _NO_UNITS:
+        return (ALL_THE_SAME,)
+    return (Way(f"they are {name}", {"units": {kind: _UNITS.get(name, name)}}), ALL_THE_SAME)
 
 
 def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:

@@ -23,6 +23,7 @@ from palpate.reconstruction.geometry.registration import (
     Registration,
     ShapeToPlace,
     TouchedPoints,
+    off_surface,
     register,
 )
 from palpate.reconstruction.geometry.slab import place_slab
@@ -36,9 +37,8 @@ from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError
 
 _ALIKE = 1.5
 """A rival pose whose residual is less than this times the best one's cannot be ruled out."""
-_TRUE, _BEYOND = 0.005, 3.0
-"""Of the size: how true to the object a file usually is (a cast shrinks, soft things settle); first touches
-so many standard deviations of that and of their own error off it lie on another object."""
+_TRUE = 0.005
+"""Of the size: how true to the object a file usually is (a cast shrinks, soft things settle)."""
 _FAR = 0.1
 """Of the size: a median residual beyond this is another object, unit or frame."""
 
@@ -113,24 +113,11 @@ def _check(given: ClosedSurface, found: Registration, options: GeometryOptions) 
 
 
 def _doubt(given: ClosedSurface, found: Registration, touched: TouchedPoints, *, free: bool) -> str:
-    """Why the shape is another object's; '' where first touches lie on it as they can, or are too few.
-
-    Of 68 % of the places, with what the six numbers of a registered pose have taken off.
-    """
-    places = np.unique(touched.site)
-    left = len(places) - 6 * free
-    if left < 1:
+    """Why the shape is another object's; '' where first touches lie on it as they can, or are too few."""
+    off = off_surface(found.residual_m, touched.site, touched.error_m, _TRUE * given.size_m, 6 * free)
+    if off is None or not off.words:
         return ""
-    off = np.array([np.median(np.abs(found.residual_m[touched.site == s])) for s in places])
-    typical = float(np.percentile(off, 68.3)) * float(np.sqrt(len(places) / left))
-    can = float(np.hypot(np.median(touched.error_m), _TRUE * given.size_m))
-    if typical <= _BEYOND * can:
-        return ""
-    return (
-        f"'{given.name}' may be another object's shape: first touches lie {1e3 * typical:.1f} mm off it (68 "
-        f"% of the places), where {1e3 * _BEYOND * can:.1f} mm is the most that touches and file explain; "
-        "check the file, --unit and --pose"
-    )
+    return f"'{given.name}' may be another object's shape: {off.words}; check the file, --unit and --pose"
 
 
 def _placed(

@@ -29,6 +29,43 @@ _ALIKE_M = 0.02
 """Of the size: poses whose surfaces lie nearer than this are one."""
 
 
+_BEYOND = 3.0
+"""First touches so many standard deviations of their own error and the surface's lie on another one."""
+
+
+@dataclass(frozen=True)
+class OffSurface:
+    """How far first touches lie off a given surface, m: 68 % of the places are within `typical_m`, with what
+    the pose's numbers have taken off; `most_m` is what the touches' own error and the surface's explain."""
+
+    typical_m: float
+    most_m: float
+
+    @property
+    def words(self) -> str:
+        """The evidence, where it speaks against the surface; ''."""
+        if self.typical_m <= self.most_m:
+            return ""
+        return (
+            f"first touches lie {1e3 * self.typical_m:.1f} mm off it (68 % of the places), where "
+            f"{1e3 * self.most_m:.1f} mm is the most that touches and surface explain"
+        )
+
+
+def off_surface(
+    residual_m: np.ndarray, site: np.ndarray, error_m: np.ndarray, true_m: float, fitted: int
+) -> OffSurface | None:
+    """Of first touches (k,) m off a surface that is true to the object within true_m, of whose pose so many
+    numbers were fitted to them; None of too few places."""
+    places = np.unique(site)
+    left = len(places) - fitted
+    if left < 1:
+        return None
+    off = np.array([np.median(np.abs(residual_m[site == s])) for s in places])
+    typical = float(np.percentile(off, 68.3)) * float(np.sqrt(len(places) / left))
+    return OffSurface(typical, _BEYOND * float(np.hypot(np.median(error_m), true_m)))
+
+
 @dataclass(frozen=True)
 class TouchedPoints:
     """What the registration goes by; device frame. centres: (k, 3) m of the tip; normals: (k, 3) outward,

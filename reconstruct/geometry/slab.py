@@ -10,12 +10,12 @@ from palpate.mechanics.frames import support_axes
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.mechanics.statistics import biweight
-from palpate.reconstruction.geometry.registration import (
-    DIRECTION_RAD,
-)
+from palpate.reconstruction.geometry.registration import DIRECTION_RAD, off_surface
 from palpate.reconstruction.geometry.stated import GeometryOptions, Placed, base_of_rim, foot_rim
 from palpate.reconstruction.steps.s4_surface import Surface
 
+_FLAT = 0.01
+"""Of the way between the touches: how flat what is called flat usually is."""
 _MARGIN, _CELLS = 2.0, 40
 """A slab reaches this many thicknesses beyond the touches, in at most so many cells a side."""
 _JUST_BELOW, _DEEP_CELLS = 0.99, 8
@@ -94,7 +94,17 @@ def place_slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -
             "height_sd_m": float(tilt_sd[2]),
         },
         notes=tuple(notes),
+        doubt=_doubt(presses, residual, spread, options),
     )
+
+
+def _doubt(presses: Presses, residual_m: np.ndarray, spread_m: float, options: GeometryOptions) -> str:
+    """Why the object is not flat; '' where first touches lie on a plane as they can, or are too few."""
+    fitted = 3 * (options.pose == "auto")
+    off = off_surface(residual_m, presses.site, presses.onset_error_m, _FLAT * spread_m, fitted)
+    if off is None or not off.words:
+        return ""
+    return f"the object is no {options.kind}: {off.words}; give its shape with --shape, or trace its base"
 
 
 def flat_mesh(size: np.ndarray, mesh_size_m: float, cells: int) -> TetMesh:

@@ -214,7 +214,8 @@ def find_interval(
         if not inside:
             raise NoBaseError(
                 f"no contact with the support between {given[0]:.2f} and {given[1]:.2f} s (boundary_phase): "
-                "trace the object's base first, or give [object] model = PATH of a model whose base stands in"
+                "trace the object's base first, give [object] model = PATH of a model whose base stands in, "
+                "or say what is known of the object: --shape FILE, --slab M or --half-space"
             )
         return inside[0][0], inside[-1][1]
     for i, (a, b) in enumerate(found):
@@ -228,8 +229,8 @@ def find_interval(
             return found[first][0], found[last][1]
     raise NoBaseError(
         "no boundary phase found: nowhere does the tip slide further than 8 of its radii in one plane; trace "
-        "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a "
-        "model whose base stands in"
+        "the object's base first, state [recording] boundary_phase, give [object] model = PATH of a model "
+        "whose base stands in, or say what is known of the object: --shape FILE, --slab M or --half-space"
     )
 
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,8 @@ from palpate.render.press import COLUMNS as PRESS_COLUMNS
 class Opened(Result):
     """kind: recording, curves, mesh or model. sources: names of the files. understood: what it was taken for,
     and as what. odds: of the least sure of it. notes: what was done to it, a line each. result: a
-    Reconstruction, Material, Model, or the Checkup that found something grave. `plot`, `show`: the result's.
+    Reconstruction, Material, Model, or the Checkup that found something grave. said: what was given of it, by
+    name. `plot`, `show`: the result's.
     """
 
     kind: str
@@ -34,6 +35,7 @@ class Opened(Result):
     result: Any
     notes: tuple[str, ...] = ()
     odds: float = 1e6
+    said: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def good(self) -> bool:

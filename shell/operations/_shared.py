@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentTypeError
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from palpate.mechanics.disk.surface_files import UNITS, is_surface_file
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import pairs
 from palpate.operations._declare import argument, option
-from palpate.operations._to_argparse import natural
+from palpate.operations._to_argparse import finite, natural
 from palpate.render.registry import names, simulator_names
 
 if TYPE_CHECKING:
@@ -95,6 +96,24 @@ def columns_option(roles: str, **more: Any) -> Mapping[str, Any]:
     return option(words, flag="--column", metavar="ROLE=NAME", count="repeat", **more)
 
 
+def seconds(text: str, flag: str) -> float:
+    """A number of seconds that was typed; raises OptionError for no finite one."""
+    try:
+        return finite(text)
+    except (ValueError, ArgumentTypeError) as error:
+        raise OptionError(f"{flag}: '{text}' is no finite number of seconds") from error
+
+
+def offset_option() -> Mapping[str, Any]:
+    """--offset, of two files with a clock each."""
+    words = "offset of the force's clock, or auto (cross-correlation)"
+    return option(words, unit="s", metavar="NUMBER", parse=_offset, advanced=True)
+
+
+def _offset(text: str) -> float | str:
+    return text if text == "auto" else seconds(text, "--offset")
+
+
 @dataclass(frozen=True)
 class MeshFileOptions:
     """How a surface's file (STL, OBJ, PLY, glTF, VTP, VTU, MSH, INP) is meant, where one is the object."""
@@ -150,6 +169,16 @@ def given_model(model: Any, said: Mapping[str, Any], flag: str = "--model") -> A
             raise OptionError(f"--{flags[0]} needs {flag} FILE: the surface that it is about")
         return model
     return given_scene(model, said) if flags or is_surface_file(Path(model)) else model
+
+
+def names_scene(model: Any) -> bool:
+    """Whether what is touched is a scene, not an object by itself: a MODEL, a recording, a surface's file."""
+    from palpate.scenes.scene import Scene, load_scene
+
+    if not isinstance(model, str | Path):
+        return isinstance(model, Scene)
+    scene = load_scene(model)
+    return scene.kind == "phantom" or Path(scene.source) != Path(model).resolve()
 
 
 def with_friction(options: RenderOptions, scene: Scene) -> RenderOptions:

@@ -10,7 +10,6 @@ points. Libraries beyond the program's own: palpate[import].
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,8 +17,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 from palpate.mechanics.errors import OptionError
 from palpate.operations._call import Call
 from palpate.operations._declare import argument, operation, option
-from palpate.operations._shared import SAMPLES, ClockOfRows, Units, columns_option, named, output_option
-from palpate.operations._to_argparse import finite, vector
+from palpate.operations._shared import (
+    SAMPLES,
+    ClockOfRows,
+    Units,
+    columns_option,
+    named,
+    offset_option,
+    output_option,
+    seconds,
+)
+from palpate.operations._to_argparse import vector
 
 if TYPE_CHECKING:
     from palpate.importing.imported import Imported
@@ -30,22 +38,11 @@ def _list(text: str) -> list[float]:
     return vector(text).tolist()
 
 
-def _seconds(text: str, flag: str) -> float:
-    try:
-        return finite(text)
-    except (ValueError, argparse.ArgumentTypeError) as error:
-        raise OptionError(f"{flag}: '{text}' is no finite number of seconds") from error
-
-
 def _tare(text: str) -> tuple[float, ...]:
     parts = text.split(",")
     if len(parts) != 2:
         raise OptionError(f"--tare is '{text}'; it must be two times START,END in s")
-    return tuple(_seconds(part, "--tare") for part in parts)
-
-
-def _offset(text: str) -> float | str:
-    return text if text == "auto" else _seconds(text, "--offset")
+    return tuple(seconds(part, "--tare") for part in parts)
 
 
 @operation(progress=False)
@@ -95,16 +92,7 @@ def import_table(
         Sequence[float] | None,
         option("subtract the mean force of this time span", unit="s", metavar="START,END", parse=_tare),
     ] = None,
-    offset_s: Annotated[
-        float | str | None,
-        option(
-            "offset of the force's clock, or auto (cross-correlation)",
-            unit="s",
-            metavar="NUMBER",
-            parse=_offset,
-            advanced=True,
-        ),
-    ] = None,
+    offset_s: Annotated[float | str | None, offset_option()] = None,
     clock: ClockOfRows = None,
     rate_hz: Annotated[
         float | None, option("rate to resample to, or rate of rows without a time", unit="Hz", advanced=True)

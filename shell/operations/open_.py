@@ -9,14 +9,16 @@ predict held-out data.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.options import flag_of
 from palpate.operations._call import Call
-from palpate.operations._declare import argument, operation, option
+from palpate.operations._declare import Given, argument, operation, option
 from palpate.operations._shared import (
     MODEL,
     ClockOfRows,
@@ -26,9 +28,11 @@ from palpate.operations._shared import (
     Units,
     columns_option,
     named,
+    offset_option,
     report_option,
     save_option,
 )
+from palpate.reconstruction.methods import ReconstructOptions
 
 if TYPE_CHECKING:
     from palpate.importing.kinds import Opened
@@ -36,7 +40,7 @@ if TYPE_CHECKING:
     from palpate.mechanics.recording.recording import Recording
 
 
-@operation()
+@operation(common="shape slab_m half_space sink_m poisson_ratio")
 def open(
     *files: Annotated[
         Any,
@@ -56,9 +60,6 @@ def open(
     tip: TipForm = None,
     tip_radius_m: Annotated[float | None, option("radius of the tip, if no file gives it", unit="m")] = None,
     tip_angle_deg: TipAngle = None,
-    poisson_ratio: Annotated[
-        float | None, option("of the material; None: as the file says, else 0.49")
-    ] = None,
     columns: Annotated[
         Mapping[str, str] | None,
         columns_option("as of import; of curves t, depth (or height), load", advanced=True),
@@ -75,19 +76,20 @@ def open(
         option("sign of a machine's load as it presses", choices=("positive", "negative"), advanced=True),
     ] = None,
     clock: ClockOfRows = None,
-    slab_m: Annotated[
-        float | None, option("thickness, if the object is a slab", unit="m", flag="--slab")
+    rate_hz: Annotated[
+        float | None,
+        option("rate to resample a log to, or rate of rows without a time", unit="Hz"),
     ] = None,
-    half_space: Annotated[bool, option("the object is deep and wide compared with the contacts")] = False,
+    offset_s: Annotated[float | str | None, offset_option()] = None,
     layer_m: Annotated[
-        float | None, option("thickness of a machine's sample; None: a half-space", unit="m")
+        float | None, option("thickness of a machine's sample; None: a half-space", unit="m", advanced=True)
     ] = None,
     young_modulus_pa: Annotated[
         float | None, option("Young's modulus, for a surface file", unit="Pa", flag="--modulus")
     ] = None,
-    unit: Annotated[str, option("unit of a surface file: m, cm, mm, um, in")] = "m",
     fast: Annotated[bool, option("try fewer effects", advanced=True)] = False,
     seed: Seed = 0,
+    how: Given[ReconstructOptions],
     call: Call,
 ) -> Opened:
     """Whatever it is: what it was taken for, brought in, checked, and the one sensible thing done.
@@ -102,31 +104,32 @@ def open(
 
     if not files:
         raise OptionError("pp.open needs a file: name at least one")
-    kind = "recording" if isinstance(files[0], Plain) else kind_of_file(
-        Path(files[0]), named(columns, "columns"), named(units, "units")
-    )  # fmt: skip
+    columns, units = named(columns, "columns"), named(units, "units")
+    kind = "recording"
+    if not isinstance(files[0], Plain):
+        kind = kind_of_file(Path(files[0]), columns, units)
     of_file = {"tip_radius_m": tip_radius_m, "columns": columns, "units": units, "clock": clock}
-    thing = {"slab_m": slab_m} if slab_m else {"half_space": True} if half_space else {}
-    of_material = {} if poisson_ratio is None else {"poisson_ratio": poisson_ratio}
-    made = partial(
-        _reconstructed, files, {**thing, **of_material}, save=save, seed=seed, progress=call.wanted
-    )
+    of_log = {**of_file, "force_on": force_on, "rate_hz": rate_hz, "offset_s": offset_s}
+    if kind == "recording" and not isinstance(files[0], Plain) and any(of_log.values()):
+        # said anew how its rows are meant: they are read as any other table
+        files, stated = _as_table(_only(files))
+        kind, of_log = "table", of_log | {name: of_log[name] or value for name, value in stated.items()}
+    _refuse_idle(kind, files[0], how)
     of_tip = {"tip": tip, "tip_angle_deg": tip_angle_deg}
     if kind != "curves":
         _sphere_alone(of_tip)
+    opened = {"files": files, "save": save, **of_log, **how}
+    made = partial(_reconstructed, files, opened, how, save=save, seed=seed, progress=call.wanted)
     match kind:
         case "model":
             result = _model(files)
         case "mesh":
-            result = _mesh(files, save, unit, tip_radius_m, young_modulus_pa, of_material, call.wanted)
+            result = _mesh(files, save, tip_radius_m, young_modulus_pa, how, call.wanted)
         case "curves":
-            of_machine = {
-                "travel": travel, "compression": compression, "layer_m": layer_m, "fast": fast,
-                **of_material, **of_tip,
-            }  # fmt: skip
-            result = _curves(files, seed=seed, progress=call.wanted, **of_file, **of_machine)
+            of_machine = {"travel": travel, "compression": compression, "layer_m": layer_m, "fast": fast}
+            result = _curves(files, seed=seed, progress=call.wanted, **of_file, **of_machine, **of_tip, **how)
         case "table":
-            result = _table(files, made, thing=thing, force_on=force_on, **of_file)
+            result = _table(files, made, opened, thing=_known(how), **of_log)
         case _:
             result = made(read_recording(_only(files)), {"took it for": "a recording"})
     page = f"{Path(files[0]).name.split('.')[0] or 'opened'}-palpate.html" if report is None else report
@@ -134,17 +137,6 @@ def open(
         call.then(lambda: [f"report: {result.report(page)}"])
     call.exit_code = 0 if result.good else 1
     return result
-
-
-def _sphere_alone(of_tip: Mapping[str, Any]) -> None:
-    """Raise OptionError for a tip that recordings, surfaces and models know nothing of."""
-    for name, value in of_tip.items():
-        if value not in (None, "sphere"):
-            flag = "--" + name.removesuffix("_deg").replace("_", "-")
-            raise OptionError(
-                f"{flag} is {value}, and an object is pressed by a sphere alone: leave {flag} out (a "
-                "machine's curves take other tips)"
-            )
 
 
 def _model(files: tuple[Any, ...]) -> Opened:
@@ -157,27 +149,19 @@ def _model(files: tuple[Any, ...]) -> Opened:
 def _mesh(
     files: tuple[Any, ...],
     save: str | Path | None,
-    unit: str,
     tip_radius_m: float | None,
     modulus_pa: float | None,
-    of_material: Mapping[str, Any],
+    how: Mapping[str, Any],
     progress: bool | Progress,
 ) -> Opened:
     from palpate.importing.kinds import Opened
     from palpate.operations.model import model_of
 
-    made = model_of(
-        _only(files),
-        modulus_pa,
-        save=save,
-        unit=unit,
-        tip_radius_m=tip_radius_m,
-        progress=progress,
-        **of_material,
-    )
+    made = model_of(_only(files), modulus_pa, save=save, tip_radius_m=tip_radius_m, progress=progress, **how)
     notes = () if modulus_pa else ("no modulus was given: 20000 Pa is taken; --modulus PA sets another",)
-    understood = {"took it for": f"the surface of an object, lengths in {unit}"}
-    return Opened("mesh", _names(files), understood, result=made, notes=notes)
+    understood = {"took it for": f"the surface of an object, lengths in {how.get('unit', 'm')}"}
+    said = {"files": files, "tip_radius_m": tip_radius_m, "young_modulus_pa": modulus_pa, **how}
+    return Opened("mesh", _names(files), understood, result=made, notes=notes, said=said)
 
 
 def _curves(files: tuple[Any, ...], **said: Any) -> Opened:
@@ -189,10 +173,43 @@ def _curves(files: tuple[Any, ...], **said: Any) -> Opened:
     return Opened("curves", _names(files), understood, result=made, odds=made.odds)
 
 
-def _table(files: tuple[Any, ...], made: Callable[..., Opened], **said: Any) -> Opened:
+_IDLE = {"mesh": "unit up sink_m poisson_ratio mesh_size_m", "curves": "poisson_ratio", "model": ""}
+"""What holds for a kind of file, of what is said of a reconstruction."""
+
+
+def _refuse_idle(kind: str, file: Any, how: Mapping[str, Any]) -> None:
+    """Raises OptionError for what says nothing of such a file."""
+    for name in how:
+        if kind in _IDLE and name not in _IDLE[kind].split():
+            flag = flag_of(open.operation.fields[name])  # type: ignore[attr-defined]
+            took = {"mesh": "a surface", "curves": "a machine's curves", "model": "a MODEL"}[kind]
+            raise OptionError(f"{flag} is about a recording, and '{file}' is {took}: leave it out")
+
+
+def _known(how: Mapping[str, Any]) -> dict[str, Any]:
+    """What [object] of a recording says of a flat one."""
+    return {name: how[name] for name in ("slab_m", "half_space") if how.get(name)}
+
+
+def _as_table(file: Any) -> tuple[tuple[Path], dict[str, Any]]:
+    """A recording's samples, and what its description states of them."""
+    from palpate.mechanics.disk.reading import read_toml
+    from palpate.mechanics.errors import RecordingError
+    from palpate.mechanics.recording.files import recording_files
+
+    samples, description = recording_files(file)
+    held = read_toml(description, RecordingError)
+    tool, about = held.get("tool", {}), held.get("recording", {})
+    return (samples,), {"tip_radius_m": tool.get("tip_radius_m"), "force_on": about.get("force_on")}
+
+
+def _table(
+    files: tuple[Any, ...], made: Callable[..., Opened], opened: dict[str, Any], **said: Any
+) -> Opened:
     from palpate.operations.import_ import import_table
 
     brought = import_table(*files, **said)
+    opened["names"] = {role: column.name for role, column in brought.understood.columns.items()}
     understood = {
         "took it for": "a recording in another program's table",
         **{role: str(c).partition(" = ")[2] for role, c in brought.understood.columns.items()},
@@ -202,7 +219,8 @@ def _table(files: tuple[Any, ...], made: Callable[..., Opened], **said: Any) -> 
 
 def _reconstructed(
     files: tuple[Any, ...],
-    geometry: Mapping[str, Any],
+    opened: Mapping[str, Any],
+    how: Mapping[str, Any],
     recording: Recording,
     understood: dict[str, str],
     notes: tuple[str, ...] = (),
@@ -212,18 +230,36 @@ def _reconstructed(
     seed: int,
     progress: bool | Progress,
 ) -> Opened:
-    """Checked; reconstructed unless something is grave."""
+    """Checked; reconstructed unless something is grave. opened: what was given, by name."""
     from palpate.importing.kinds import Opened
-    from palpate.operations.check import check
     from palpate.operations.reconstruct import reconstruct
+    from palpate.reconstruction.checks.finding import Checkup
+    from palpate.reconstruction.checks.registry import looked_at
+    from palpate.reconstruction.geometry.stated import GeometryOptions
 
-    checked = check(recording, progress=progress)
-    result: Any = checked
-    if not checked.grave:
+    named = {field.name for field in dataclasses.fields(GeometryOptions)}
+    geometry = GeometryOptions(**{name: value for name, value in how.items() if name in named})
+    with Call(progress).progress("check"):
+        findings, seen = looked_at(recording, geometry)
+    result: Any = Checkup(recording, findings, seen, opened=opened)
+    if how.get("force") or not result.grave:
         result = reconstruct(
-            recording, save=save, seed=seed, progress=progress, field="where-beaten", **geometry
+            recording, save=save, seed=seed, progress=progress, **{"field": "where-beaten", **how}
         )
-    return Opened("recording", _names(files), understood, result=result, notes=notes, odds=odds or 1e6)
+    return Opened(
+        "recording", _names(files), understood, result=result, notes=notes, odds=odds or 1e6, said=opened
+    )
+
+
+def _sphere_alone(of_tip: Mapping[str, Any]) -> None:
+    """Raise OptionError for a tip that recordings, surfaces and models know nothing of."""
+    for name, value in of_tip.items():
+        if value not in (None, "sphere"):
+            flag = "--" + name.removesuffix("_deg").replace("_", "-")
+            raise OptionError(
+                f"{flag} is {value}, and an object is pressed by a sphere alone: leave {flag} out (a "
+                "machine's curves take other tips)"
+            )
 
 
 def _only(files: tuple[Any, ...]) -> Any:

@@ -1,9 +1,10 @@
 """One scripted press on a model, headless: t,x,y,z,depth,fx,fy,fz in s, m and N (force on the tool).
 
-The tip comes straight along --direction with its centre aimed at --at (m, device frame), goes in by --depth
-along the surface's normal after first touch, and comes out again. Next to the object it meets the support, as
-in 'palpate touch' (--no-support leaves it out). With --expect the curve is compared with a stored one: exit
-code 1 if the forces differ by more than --tolerance anywhere.
+The tip comes straight along --direction with its centre aimed at --at (m, device frame; left out: the
+object's centre of volume), goes in by --depth along the surface's normal after first touch, and comes out
+again. Next to the object it meets the support, as in 'palpate touch' (--no-support leaves it out): that is
+said, and on a model or a surface's file the exit code is 1. With --expect the curve is compared with a stored
+one: exit code 1 if the forces differ by more than --tolerance anywhere.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ from palpate.mechanics.disk.surface_files import is_surface_file
 from palpate.mechanics.options import EXACT
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, operation, option
-from palpate.operations._shared import MeshFileOptions, Renders, given_model, model_argument, output_option
+from palpate.operations._shared import (
+    MeshFileOptions,
+    Renders,
+    given_model,
+    model_argument,
+    names_scene,
+    output_option,
+)
 from palpate.operations._to_argparse import vector
 from palpate.operations.renderer import touched_scene
 from palpate.render.options import RenderOptions
@@ -33,9 +41,14 @@ if TYPE_CHECKING:
 def press(
     model: Annotated[ModelLike | Renderer, model_argument()],
     at: Annotated[
-        Sequence[float],
-        option("point that the tip's centre is aimed at, (3,)", unit="m", metavar="X,Y,Z", parse=vector),
-    ],
+        Sequence[float] | None,
+        option(
+            "point that the tip's centre is aimed at, (3,); None: the object's centre of volume",
+            unit="m",
+            metavar="X,Y,Z",
+            parse=vector,
+        ),
+    ] = None,
     direction: Annotated[
         Sequence[float] | None,
         option(
@@ -70,7 +83,8 @@ def press(
     """One scripted press: the force response of a model at one place.
 
     A renderer that is there already saves seconds where many presses follow. Device frame; forces N on the
-    tool. Raises OptionError where the line misses object and support, or grazes them.
+    tool; `on_support` where the first contact is not the object. Raises OptionError where the line misses
+    object and support, or grazes them.
     """
     import numpy as np
 
@@ -95,7 +109,7 @@ def press(
     radius = scene.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
     curve = pressed(
         scene,
-        np.asarray(at, dtype=float),
+        None if at is None else np.asarray(at, dtype=float),
         -scene.model.support.normal if straight else np.asarray(direction, dtype=float),
         Stroke(depth_m, speed_m_per_s, hold_s, approach_m, rate_hz),
         radius,
@@ -106,9 +120,15 @@ def press(
     if is_surface_file(Path(str(model))):
         call.then(f"  (the file says none: {DEFAULT_MODULUS_PA:g} Pa, unless --modulus states another)")
     call.then_save(curve, output)
+    call.exit_code = int(curve.on_support and not names_scene(model))
     if expected is not None:
         call.then(partial(_compared, curve, expected, tolerance, call))
-    call.following = [partial(next_lines, curve, written=output)]
+    touched = None
+    if isinstance(model, str | Path):
+        from palpate.operations._written import typed
+
+        touched = typed("touch", {"scene": model, **file})
+    call.following = [partial(next_lines, curve, written=output, touched=touched)]
     return curve
 
 
@@ -117,14 +137,15 @@ def _compared(curve: Curve, expected: Curve, tolerance: float, call: Call) -> li
     from palpate.render.press import greatest_difference
 
     worst, when = greatest_difference(curve, expected)
-    call.exit_code = int(not worst <= tolerance)
+    passed = worst <= tolerance
+    call.exit_code = call.exit_code or int(not passed)
     call.figures = {
         "difference_n": worst,
         "at_s": when,
         "tolerance_n": tolerance,
-        "passed": call.exit_code == 0,
+        "passed": passed,
     }
     return [
-        f"{'differs' if call.exit_code else 'agrees'}: greatest difference {worst:.4g} N at {when:.4g} s, "
+        f"{'agrees' if passed else 'differs'}: greatest difference {worst:.4g} N at {when:.4g} s, "
         f"allowed {tolerance:g} N"
     ]

@@ -49,6 +49,11 @@ def read_recording(
                 f"{error}; another program's file is brought in by 'palpate import {source} -o REC', or by "
                 f"'palpate open {source}'"
             ) from error
+        if isinstance(error.__cause__, RecordingError) and error.__cause__.said:
+            from palpate.operations._written import open_words
+
+            words = open_words({"files": (source,)}, error.__cause__.said)
+            raise RecordingError(f"{error}; so it is read by '{words}'") from error
         if Path(source).exists() or "." in Path(source).name:
             raise
         raise RecordingError(f"{error}; embedded are {', '.join(embedded_names())}") from error

@@ -74,16 +74,14 @@ class ServoReport:
         """In lines. sent: whether there was a device to send a force to."""
         c, late = self.compute.summary(), self.lateness.summary()
         lines = [
-            f"{self.rate_hz:.0f} forces a second for {self.seconds:.1f} s: of "
-            f"{self.ticks + self.missed_ticks} {self.missed_ticks} were skipped, {self.late_ticks} came late",
+            f"{self.rate_hz:.0f} forces a second for {self.seconds:.1f} s: "
+            f"{self.missed_ticks} skipped, {self.late_ticks} late",
             f"in contact {100 * self.contact_share:.0f} % of the time; greatest force "
             f"{self.peak_rendered_n:.2f} N rendered"
             + (f", {self.peak_force_n:.2f} N sent{self._held_back()}" if sent else "")
             + f"; energy given to the hand at most {1000 * self.energy_given_back_j:.3f} mJ",
-            f"one force is computed in {c['median']:.0f} µs, 999 of 1000 within {c['p99.9']:.0f}, all within "
-            f"{c['max']:.0f}",
-            f"it begins {late['median']:.0f} µs after its time, 999 of 1000 within {late['p99.9']:.0f}, all "
-            f"within {late['max']:.0f}",
+            f"one force is computed in {c['median']:.0f} µs (median), {c['max']:.0f} µs at most",
+            f"it begins {late['median']:.0f} µs after its time (median), {late['max']:.0f} µs at most",
         ]
         if self.unsettled_ticks:
             lines.append(unsettled_words(self.unsettled_ticks, self.ticks))

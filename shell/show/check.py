@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.mechanics.recording.recording import Recording
-from palpate.reconstruction.checks.finding import Checkup, Finding
+from palpate.operations._written import open_words
+from palpate.reconstruction.checks.finding import Checkup, Finding, Way
 from palpate.reconstruction.checks.samples import CHANNELS
 from palpate.show import story as say
 from palpate.show.page import drawn, file_words, subplots
@@ -49,16 +50,19 @@ def story(result: Checkup) -> say.Story:
     )
     for k, finding in enumerate(findings, 1):
         yield say.Section(
-            f"{k}. {finding.name}{' (grave)' if finding.grave else ''}", _found(recording, finding, k)
+            f"{k}. {finding.name}{' (grave)' if finding.grave else ''}", _found(result, finding, k)
         )
     yield say.Section("What was measured", [
         say.Rows(["quantity", "here", "usual"], (_seen(*row) for row in result.seen))
     ])  # fmt: skip
 
 
-def _found(recording: Recording, finding: Finding, number: int) -> say.Story:
+def _found(result: Checkup, finding: Finding, number: int) -> say.Story:
+    recording = result.recording
     yield say.Sentence(finding.saw)
     yield say.Sentence(f"How sure: {finding.sure}. What to do: {finding.todo}")
+    if finding.grave:
+        yield from (say.Detail(_way(result, way)) for way in finding.ways)
     yield say.Picture(lambda: stretch_figure(recording, finding), _caption(finding), name=f"finding-{number}")
 
 
@@ -112,9 +116,16 @@ def _meaning(result: Checkup) -> str:
 
 
 def _next_steps(result: Checkup) -> list[str]:
-    if grave := [f.todo for f in result.findings if f.grave]:
-        return grave[:1]
+    if result.grave:
+        first, *_ = result.grave
+        whose = {way.says: way for finding in result.grave for way in finding.ways}
+        return [first.todo, *(_way(result, way) for way in whose.values())]
     return [f"make a model of it: `palpate reconstruct {file_words(result.recording.path, 'REC')} -o MODEL`"]
+
+
+def _way(result: Checkup, way: Way) -> str:
+    """When to go on so, and the command."""
+    return f"{way.says}: `{open_words(result.opened or {'files': (result.recording,)}, way.options)}`"
 
 
 def stretch_figure(recording: Recording, finding: Finding) -> Figure:

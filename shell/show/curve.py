@@ -12,7 +12,7 @@ from palpate.render.base import Renderer
 from palpate.render.force_error import said
 from palpate.render.press import Curve
 from palpate.show import story as say
-from palpate.show.page import file_words
+from palpate.show.page import feel_step
 from palpate.words import kpa, mm, unsettled_words
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from palpate.render.exact import SolvedPlace
 
 
-def story(result: Curve, written: str | None = None) -> say.Story:
-    """How it answers the press. written: the curve's file."""
+def story(result: Curve, written: str | None = None, touched: str | None = None) -> say.Story:
+    """How it answers the press. written: the curve's file; touched: the command that touches it."""
     depth = float(result.depth.max())
     if result.renderer is None:
         yield say.Headline(f"a curve that was read: {result.peak_force_n:.4g} N at most, {mm(depth)} deep")
@@ -31,6 +31,14 @@ def story(result: Curve, written: str | None = None) -> say.Story:
     force = ", ".join(f"{round(float(f), 3) + 0.0:g}" for f in result.force_at(depth))
     normal = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in np.asarray(result.normal))
     made = result.renderer.model
+    if result.on_support:
+        low, high = (", ".join(f"{v:.3g}" for v in f(made.mesh.points, axis=0)) for f in (np.min, np.max))
+        yield say.Headline(
+            f"this pressed the support, not the object: {result.peak_force_n:.3g} N at most are the support's"
+        )
+        yield say.Detail(f"the object lies within ({low}) to ({high}) m: aim `--at` there")
+        yield say.Next(["press the object through its middle: the same without `--at`"])
+        return
     yield say.Headline(
         f"{result.renderer.name}: {result.peak_force_n:.3g} N at most; {mm(depth)} deep the force on the "
         f"tool is ({force}) N"
@@ -45,11 +53,11 @@ def story(result: Curve, written: str | None = None) -> say.Story:
         yield say.Detail(words)
     if result.exact is not None:
         yield from _solved(result.exact)
-    model = file_words(made.path, "MODEL")
     later = "see whether it stays so: press with `-o CURVE.csv`, later with `--expect CURVE.csv`"
     if written is not None:
         later = f"see later whether it stays so: the same press with `--expect {written}`"
-    yield say.Next([f"feel it: `palpate touch {model}`", later])
+    feel = f"feel it: `{touched}`" if touched else None
+    yield say.Next([feel or feel_step(made.path, "palpate model FILE -o MODEL"), later])
 
 
 def _solved(exact: SolvedPlace) -> say.Story:
@@ -67,6 +75,7 @@ def solved_rows(depth: str, rows: Iterable[tuple[float, float, float, float]]) -
 
 
 KEYS: tuple[say.Key, ...] = (
+    "on_support",
     ("renderer", lambda result: _renderer(result).name),
     "normal",
     ("depth_m", lambda result: result.depth.max()),

@@ -56,7 +56,7 @@ def story(result: DemoResult) -> say.Story:
     yield say.Headline(f"{presses} became a model that feels like the object: it is {off}", on=say.PAGE)
     yield say.TextLine(f"its force is {off}")
     missed = servo.missed_ticks
-    of = f"of {servo.ticks + missed} {missed} were skipped"
+    of = f"{missed} forces were skipped"
     yield say.TextLine(f"{felt}: {of}, {servo.late_ticks} came late")
     if result.diagnosis is not None:
         yield say.TextLine(f"diagnosis: {verdict(result.diagnosis)}")
@@ -146,7 +146,7 @@ def _loop(servo: ServoReport) -> list[list[str]]:
         ["forces given", f"{servo.ticks} in {servo.seconds:.1f} s"],
         ["skipped, since the machine was busy", str(servo.missed_ticks)],
         ["given late", str(servo.late_ticks)],
-        ["to compute one force", f"{compute['median']:.0f} µs; 999 of 1000 within {compute['p99.9']:.0f} µs"],
+        ["to compute one force", f"{compute['median']:.0f} µs (median), {compute['max']:.0f} µs at most"],
         ["in contact", f"{100 * servo.contact_share:.0f} % of the time"],
         ["greatest force", f"{servo.peak_rendered_n:.2f} N rendered, {servo.peak_force_n:.2f} N sent"],
         ["energy given to the hand", f"{1e3 * servo.energy_given_back_j:.3f} mJ at most"],

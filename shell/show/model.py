@@ -16,7 +16,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.show import story as say
-from palpate.show.page import drawn, file_words
+from palpate.show.page import drawn, feel_step, file_words
 from palpate.show.quantities import (
     DEPTH,
     KELVIN_VOIGT,
@@ -103,7 +103,7 @@ def story(result: Model) -> say.Story:
     yield say.Sentence(f"About as soft as {softness(result.material.young_modulus_pa)}", on=say.PAGE)
     where = file_words(result.path, "MODEL")
     yield say.Next([
-        f"feel it: `palpate touch {where}`",
+        feel_step(result.path, "palpate model FILE -o MODEL"),
         f"let others press it: `palpate export {where} --to page -o touch.html`",
     ])  # fmt: skip
     yield say.Turned(

@@ -6,8 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from palpate.importing.kinds import Opened
+from palpate.operations._written import open_words
 from palpate.show import story as say
 from palpate.show import story_of
+from palpate.show.page import feel_step
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +29,8 @@ def story(result: Opened) -> say.Story:
     yield from (say.Note(note, on=say.TEXT) for note in result.notes)
     yield from (say.TextLine(line) for line in more)
     for block in story_of(result.result):
+        if isinstance(block, say.Next) and (steps := _steps(result)):
+            block = say.Next(steps)
         whole = isinstance(block, say.Title) or (isinstance(block, say.Section) and block.evidence)
         if block.on != say.TEXT and not whole:
             yield block if isinstance(block, say.Next) else replace(block, on=say.PAGE)
@@ -34,6 +38,22 @@ def story(result: Opened) -> say.Story:
         say.Rows(["what", "as"], [[key, value] for key, value in result.understood.items()]),
         *map(say.Note, result.notes),
     ])  # fmt: skip
+
+
+def _steps(result: Opened) -> list[str]:
+    """What to do with a model of which no folder was written; nothing for another result."""
+    from palpate.mechanics.model.model import Model
+    from palpate.reconstruction.pipeline import Reconstruction
+    from palpate.show.reconstruction.story import mending
+
+    made = getattr(result.result, "model", result.result)
+    if not isinstance(made, Model) or made.path is not None:
+        return []
+    ways = mending(result.result) if isinstance(result.result, Reconstruction) else []
+    return [
+        *(f"{way.says}: `{open_words(result.said, way.options)}`" for way in ways),
+        feel_step(None, open_words(result.said, {"save": "MODEL"})),
+    ]
 
 
 KEYS: tuple[say.Key, ...] = (

@@ -275,6 +275,13 @@ def file_words(path: str | Path | None, otherwise: str) -> str:
     return min(str(path), os.path.relpath(path), key=len)
 
 
+def feel_step(folder: str | Path | None, making: str) -> str:
+    """How to feel a model: its folder, or first the command that writes it to MODEL where there is none."""
+    if folder:
+        return f"feel it: `palpate touch {file_words(folder, '')}`"
+    return f"keep it, then feel it: `{making}`, `palpate touch MODEL`"
+
+
 def png_and_drawing(picture: Any) -> tuple[bytes, str]:
     """PNG data of a picture, and its packed drawing if it has one."""
     if not hasattr(picture, "savefig"):

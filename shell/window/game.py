@@ -15,6 +15,8 @@ from palpate.mechanics.model.material import Ball
 from palpate.words import mm
 
 HALF_TIME_S = 60.0
+PRESS_M = 0.008
+"""How deep a press goes at first: the deeper, the more the nodule shows."""
 
 
 @dataclass(frozen=True)
@@ -70,18 +72,20 @@ class Game:
     def lines(self, now_s: float) -> list[str]:
         """For the panel: what to do, the last round, and the mean score of each renderer."""
         if self._started_s is not None:
-            first = f"A nodule is hidden: find it, then Enter. {self.seconds(now_s):.0f} s"
+            deep, ran = mm(PRESS_M, "g"), f"{self.seconds(now_s):.0f} s"
+            first = f"Press {deep} deep at many places. Point at the most N/m, then Enter. {ran}"
         elif self.answers:
             last = self.answers[-1]
             first = (
                 f"{mm(last.off_m, '.1f')} from the nodule after {last.seconds:.0f} s by "
-                f"{last.renderer}: {last.score:.0f} points. Touch anew to go on, Tab for another renderer."
+                f"{last.renderer}: {last.score:.0f} of 100 points. Touch anew to go on; Tab: next renderer."
             )
         else:
-            first = "A nodule is hidden: press to find where it resists more, then Enter."
+            deep = mm(PRESS_M, "g")
+            first = f"A nodule is hidden: press {deep} deep at many places, and compare the N/m above."
         names = sorted({a.renderer for a in self.answers})
         scores = [
-            f"{name} {np.mean([a.score for a in self.answers if a.renderer == name]):.0f} points in "
+            f"{name} {np.mean([a.score for a in self.answers if a.renderer == name]):.0f} of 100 points in "
             f"{sum(a.renderer == name for a in self.answers)}"
             for name in names
         ]

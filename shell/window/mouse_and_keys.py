@@ -36,7 +36,6 @@ NAMES = {
     "equal": "plus",
     "KP_Add": "plus",
     "KP_Subtract": "minus",
-    "Escape": "q",
     "Home": "v",
     "KP_Enter": "Return",
 }
@@ -53,6 +52,7 @@ class Controlled(Protocol):
     game: Game | None
     boards: list[Board]
     notice: str
+    aside: str
 
     @property
     def picture_renderers(self) -> list[vtkRenderer]:
@@ -223,6 +223,8 @@ class Controls:
             "i": session.feels_inside and self._window.game is None,
             "arrows": session.inclusion is not None and self._window.game is None,
             "Return": self._window.game is not None,
+            "Escape": bool(self._window.aside),
+            "c": self._window.game is None or self._window.game.answered,  # a map would show the nodule
         }
         return frozenset(key for key in KEYS if missing.get(key, True))
 
@@ -250,6 +252,7 @@ class Controls:
             "i": self._toggle_inclusion,
             "r": self._toggle_recording,
             "p": self._save_picture,
+            "Escape": lambda: window.show_aside(window.aside),
             "h": lambda: window.show_aside("h"),
             "s": lambda: window.show_aside("s"),
             "g": lambda: window.close(scenes=True),

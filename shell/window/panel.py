@@ -32,7 +32,7 @@ class Shown(Controlled, Protocol):
     scene: Scene
     controls: Controls
     aside: str
-    coloured: bool
+    stiffness_drawn: bool
     moved_by_mouse: bool
 
     def next_words(self, frame: Frame) -> str:
@@ -130,7 +130,7 @@ def _buttons(window: Shown) -> list[Row]:
     session, offered = window.session, window.controls.offered
     chosen = {
         "b": bool(session.beside_name),
-        "c": window.coloured,
+        "c": window.stiffness_drawn,
         "i": session.inclusion is not None,
         "r": session.recording is not None,
         "s": window.aside == "s",

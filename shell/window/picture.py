@@ -18,7 +18,6 @@ from palpate.scenes.phantoms import Region
 from palpate.window import shadow
 from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
-from palpate.window.stiffness import DEPTH_M
 from palpate.window.widgets import INK
 from palpate.window.worker import Frame, RendererView
 from palpate.words import mm
@@ -27,7 +26,6 @@ ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
-STIFFNESS = f"secant stiffness at {mm(DEPTH_M, '.0f')} (N/m)"
 SPREAD = 2
 TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
 
@@ -96,11 +94,16 @@ class ObjectPicture:
 
     def colour_by_displacement(self) -> None:
         """As far as each point has moved, mm."""
+        self.by_stiffness = False
         self._colour_by("displacement (mm)", "YlOrRd", DISPLACEMENT_RANGE_MM)
 
-    def colour_by_stiffness(self, stiffness_n_per_m: np.ndarray, limits: tuple[float, float]) -> None:
-        """(n,) N/m a point, 0 where it cannot be pressed: the secant of a press; limits: of the colours."""
-        name = STIFFNESS
+    def colour_by_stiffness(
+        self, stiffness_n_per_m: np.ndarray, limits: tuple[float, float], depth_m: float
+    ) -> None:
+        """(n,) N/m a point, 0 where it cannot be pressed: the secant of a press of depth_m; limits: of the
+        colours."""
+        self.by_stiffness = True
+        name = f"force over depth at {mm(depth_m, 'g')} (N/m)"
         self._surface[name] = stiffness_n_per_m
         self._colour_by(name, "viridis", limits)
 

@@ -135,7 +135,7 @@ class WaitingWindow:
         self._chosen = next(held, self._chosen)
 
     def _key(self) -> None:
-        if self.interactor.GetKeySym() in ("q", "Escape"):
+        if self.interactor.GetKeySym() == "q":
             self._gone()
 
     def _gone(self) -> None:

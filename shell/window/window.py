@@ -21,7 +21,7 @@ from palpate.mechanics.disk.writing import PNG, atomic_file
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene
 from palpate.window.charts import AxesGizmo, LiveCharts
-from palpate.window.game import Game
+from palpate.window.game import PRESS_M, Game
 from palpate.window.guide import GhostTip
 from palpate.window.keys import Orbit
 from palpate.window.mouse_and_keys import Controls
@@ -97,6 +97,8 @@ class TouchWindow:
         support, radius = session.model.support, session.servo.tip_radius_m
         self.pointer = Pointer(points, triangles, radius, support.point, support.normal)
         self.orbit = self._look()
+        if self.game is not None:
+            self.pointer.press_depth_m = PRESS_M
         self._next = NextStep(self, mouse=self.moved_by_mouse)
         self._lay_out()
         self.controls = Controls(self)
@@ -195,6 +197,11 @@ class TouchWindow:
             x0, _, x1, _ = renderer.viewport
             board.place(x0 * width, height - 60 * scale, x1 * width, height, scale)
 
+    @property
+    def stiffness_drawn(self) -> bool:
+        """Whether colours are stiffness now, and not only wanted so."""
+        return self.pictures[0].by_stiffness
+
     def toggle_colour(self) -> None:
         """Colour by displacement, or by local stiffness as soon as that is computed."""
         self.coloured = not self.coloured
@@ -258,10 +265,11 @@ class TouchWindow:
         for picture in self.pictures:
             picture.show_inclusion(self._inside)
         if self.coloured and self.session.inclusion_felt and (self.game is None or self.game.answered):
-            maps = self._map.of(tuple(self.session.drawing(name) for name in self._names))
+            depth_m = self.pointer.press_depth_m
+            maps = self._map.of(tuple(self.session.drawing(name) for name in self._names), depth_m)
             limits = common_limits(maps)
             for picture, stiffness in zip(self.pictures, maps, strict=False):
-                picture.colour_by_stiffness(stiffness, limits)
+                picture.colour_by_stiffness(stiffness, limits, depth_m)
         if self.guide is not None and self._ghost is not None:
             self.guide.follow()
             self._ghost.show(self.guide.ghost)

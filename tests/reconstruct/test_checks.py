@@ -77,6 +77,20 @@ def test_what_is_found_says_where_and_how_sure(cylinder):
     assert "p = 1e-" in found.sure and found.decades > 6
 
 
+def test_what_is_less_than_a_step_off_a_straight_line_is_no_spike_and_more_is(cylinder):
+    """A robot's commanded way has no noise: off its lines any micrometre is millions of deviations."""
+    recording = cylinder[0]
+    knots = recording.t[::500]
+    lines = np.column_stack([np.interp(recording.t, knots, x[::500]) for x in recording.position.T])
+    kinks = np.arange(1250, len(lines) - 600, 700)
+    step = np.median(np.abs(np.diff(lines[:, 2])))
+    for size, spikes in ((0.3 * step, False), (30 * step, True)):
+        position = np.array(lines)
+        position[kinks, 2] += size
+        found = checked_samples(dataclasses.replace(recording, position=position)).found
+        assert any(f.name == "spikes" for f in found) is spikes
+
+
 def test_a_hand_that_held_still_along_one_axis_is_no_stuck_channel(cylinder):
     recording = cylinder[0]
     position = np.array(recording.position)

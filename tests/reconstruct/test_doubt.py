@@ -54,6 +54,16 @@ def test_first_touches_tell_another_objects_shape(touches, tmp_path, name):
         assert "another object's shape" in put.doubt and len(put.doubt.splitlines()) == 1
 
 
+def test_first_touches_tell_that_an_object_is_not_flat(touches):
+    _, found = touches
+    recording = raster()
+    flat = explore(recording, boundary=nowhere(recording))
+    for options in (GeometryOptions(half_space=True), GeometryOptions(slab_m=0.3)):
+        round_it = place(found, options, mesh_size_m=0.01, spacing_m=0.003)
+        assert options.kind in round_it.doubt and len(round_it.doubt.splitlines()) == 1
+        assert place(flat, options, mesh_size_m=0.01, spacing_m=0.003).doubt == ""
+
+
 @pytest.mark.parametrize("depth_matters", [True, False])
 def test_a_modulus_is_weighed_against_a_constant_push(depth_matters):
     recording = raster(tilt=False)
@@ -84,6 +94,7 @@ def test_the_command_ends_with_one_and_writes_everything(tmp_path, capsys):
     words = ["reconstruct", str(samples), "-o", str(model), "--json", str(figures), "--unit", "m"]
     assert cli.main([*words, "--shape", stl(tmp_path, "block")]) == 1
     said = capsys.readouterr().out
+    assert said.startswith("not reliable")
     (line,) = [line for line in said.splitlines() if line.startswith("not reliable")]
     assert "another object's shape" in line
     assert read_model(model).material.young_modulus_pa > 0

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 
+import numpy as np
 import pytest
 
 from palpate.cli import main
@@ -30,6 +32,46 @@ def test_a_curve_that_was_stored_is_met_again_and_another_law_is_told(model_fold
     found = json.loads(result.read_text())
     assert found["passed"] is False and found["difference_n"] > 0.01
     assert found["depth_m"] == pytest.approx(0.003, abs=1e-6)
+
+
+BESIDE = ["--at", "0.05,0,0.03", "--direction", "0,0,-1", "--depth", "0.003"]  # the block ends at 0.03
+
+
+def test_a_press_of_the_support_is_not_given_out_as_the_objects(model_folder, tmp_path, capsys):
+    result = tmp_path / "result.json"
+    assert main(["press", model_folder, *BESIDE, "--json", str(result)]) == 1
+    assert "support" in capsys.readouterr().out.split(":")[0]
+    told = json.loads(result.read_text())
+    assert told["on_support"] and "force_error_n" not in told  # the law's bound is of the object
+    assert main(["press", model_folder, *DOWN, "--json", str(result)]) == 0
+    assert json.loads(result.read_text())["on_support"] is False
+    # a table beside a scene's object is part of the scene: a warning
+    scene = tmp_path / "scene.toml"
+    shutil.copytree(model_folder, tmp_path / "block")
+    capsys.readouterr()
+    scene.write_text('title = "a block"\n[object]\nmodel = "block"\n')
+    assert main(["press", str(scene), *BESIDE]) == 0
+    assert "support" in capsys.readouterr().out.split(":")[0]
+
+
+def test_without_a_point_the_object_is_met_wherever_it_lies(model_folder, tmp_path):
+    from dataclasses import replace
+
+    from palpate.mechanics.model.files import read_model
+    from palpate.render.press import Stroke
+    from palpate.render.press import press as pressed
+    from palpate.render.registry import create
+
+    result = tmp_path / "result.json"
+    assert main(["press", model_folder, "--depth", "0.003", "--json", str(result)]) == 0
+    there = json.loads(result.read_text())["force_at_depth_n"]
+    model, shift = read_model(model_folder), np.array([0.3, -0.2, 0.1])
+    mesh = replace(model.mesh, points=model.mesh.points + shift, shape=None)
+    support = replace(model.support, point=model.support.point + shift)
+    moved = create("fem", replace(model, mesh=mesh, support=support, path=None))
+    curve = pressed(moved, None, np.array([0.0, 0.0, -1.0]), Stroke(0.003, 0.01))
+    assert not curve.on_support
+    assert curve.force_at(0.003) == pytest.approx(there, rel=0.01, abs=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -39,12 +39,17 @@ class HeldOutErrors:
 
     @property
     def doubt(self) -> str:
-        """Why the model is not reliable; '' where it predicts."""
-        if self.model_n <= self.constant_n:
+        """Why the model is not reliable; '' where it predicts, and no 1D model does so better."""
+        if self.model_n > self.constant_n:
+            return (
+                f"the model does not predict: on places that were held out it errs by {self.model_n:.3g} N, "
+                f"a constant push by {self.constant_n:.3g} N"
+            )
+        if not self.beaten_by:
             return ""
         return (
-            f"the model does not predict: on places that were held out it errs by {self.model_n:.3g} N, a "
-            f"constant push by {self.constant_n:.3g} N"
+            f"a 1D model predicts better: on places that were held out {self.beaten_by} errs by "
+            f"{self.floor_n:.3g} N, this model by {self.model_n:.3g} N"
         )
 
     @property

@@ -294,7 +294,7 @@ def _reason(
 ) -> str:
     words = f"the dent follows the {fits[0].law} law"
     if options.law == "auto":
-        words += f", which fits best in {100 * shares[0]:.0f} % of draws of the places"
+        words += f"; with other places left out at random it fits best {100 * shares[0]:.0f} times in 100"
     if options.greatest_depth_m is not None:
         return words + f"; from samples up to {limit * 1e3:g} mm deep (--greatest-depth)"
     if limit < deepest:

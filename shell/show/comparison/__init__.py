@@ -20,7 +20,7 @@ from palpate.show.comparison.figures import (
     still,
     view,
 )
-from palpate.show.page import drawn, file_words
+from palpate.show.page import drawn, feel_step, file_words
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import add_dots, add_object
 from palpate.words import mm, mn
@@ -164,6 +164,11 @@ def place(result: Comparison, plotter: Plotter) -> None:
 def _next_steps(result: Comparison) -> list[str]:
     model = file_words(result.model.path, "MODEL")
     recording = file_words(None if result.recording is None else result.recording.path, "REC")
+    if result.model.path is None:
+        return [
+            feel_step(None, f"palpate reconstruct {recording} -o MODEL"),
+            f"find what the FEM still leaves out: `palpate diagnose {recording}`",
+        ]
     return [
         f"feel it: `palpate touch {model} --beside hunt-crossley`",
         f"find what the FEM still leaves out: `palpate diagnose {recording} --model {model}`",

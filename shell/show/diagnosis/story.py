@@ -35,7 +35,7 @@ from palpate.show.diagnosis.words import (
     verdict,
     where,
 )
-from palpate.show.page import file_words
+from palpate.show.page import feel_step, file_words
 from palpate.words import (
     between_words,
     chance_words,
@@ -143,7 +143,7 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
             f"`palpate diagnose {recording} --corrected BETTER.csv.gz`"
         )
     if not asked:
-        yield f"feel it: `palpate touch {file_words(model.path, 'MODEL')}`"
+        yield feel_step(model.path, f"palpate reconstruct {recording} -o MODEL")
     if result.next_touch is not None and result.unsettled:
         yield "touch once more at the place given below, to decide between the candidates"
 

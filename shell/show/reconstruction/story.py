@@ -10,12 +10,14 @@ import numpy as np
 
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.model.model import Model
+from palpate.operations._written import open_words
+from palpate.reconstruction.checks.finding import OF_A_KNOWN_OBJECT, Way
 from palpate.reconstruction.pipeline import Reconstruction
 from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s6_one_d import low_passed
 from palpate.show import story as say
 from palpate.show.model import local, rms_by_press, usual_colourings, view_of_presses
-from palpate.show.page import file_words, subplots
+from palpate.show.page import feel_step, file_words, subplots
 from palpate.show.quantities import ERROR, MODULUS, softness
 from palpate.show.reconstruction.differences import differences, trend_words
 from palpate.show.reconstruction.exploration import damped_figure, geometry_figure, touches_figure
@@ -38,7 +40,7 @@ from palpate.show.reconstruction.tables import (
 )
 from palpate.show.scenery import Colours, draw_object, draw_touched
 from palpate.show.view3d import Colouring, Line, View
-from palpate.words import begun, counted, kpa, mm, mn, place_mm, sure_kpa
+from palpate.words import counted, kpa, mm, mn, place_mm, sure_kpa
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,17 +57,18 @@ def story(result: Reconstruction, beside: dict[str, Model] | None = None) -> say
     """
     yield say.Title(f"Reconstruction of {result.exploration.recording.name}", suffixed=True, pictures="own")
     model, exploration = result.model, result.exploration
-    presses, worse = f"{len(exploration.presses)} presses", lost(result)
+    presses = f"{len(exploration.presses)} presses"
     modulus, ends = model.material.young_modulus_pa, model.material.young_modulus_ci95_pa
+    if result.doubt:
+        yield say.Headline(f"not reliable: {result.doubt}", on=say.TEXT)
+        yield say.Headline(f"Not reliable: {result.doubt.partition(': ')[0]}", on=say.PAGE)
+        yield say.Sentence(result.doubt, on=say.PAGE)
     yield say.Headline(
-        f"{exploration.recording.name}: {presses}, {worse}Young's modulus {kpa(modulus)} ({sure_kpa(ends)})",
+        f"{exploration.recording.name}: {presses}, Young's modulus {kpa(modulus)} ({sure_kpa(ends)})",
         on=say.TEXT,
     )
-    yield say.Headline(
-        f"{begun(worse)}{presses} became a model of {kpa(modulus, '.1f')} (Young's modulus; "
-        f"{sure_kpa(ends, '.1f')})",
-        on=say.PAGE,
-    )
+    became = f"{presses} became a model of {kpa(modulus, '.1f')} (Young's modulus; {sure_kpa(ends, '.1f')})"
+    yield (say.Sentence if result.doubt else say.Headline)(became, on=say.PAGE)
     yield from _meant(result)
     yield say.Next(next_steps(result))
     for finding in result.findings:
@@ -92,9 +95,7 @@ def story(result: Reconstruction, beside: dict[str, Model] | None = None) -> say
 
 
 def _meant(result: Reconstruction) -> say.Story:
-    if result.doubt:
-        yield say.TextLine(f"not reliable: {result.doubt}")
-    else:
+    if not result.doubt:
         yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in meaning(result).split(". "))
     yield say.Detail(meaning(result), on=say.PAGE)
 
@@ -250,26 +251,27 @@ def object_figure(model: Model) -> Figure:
 
 
 def next_steps(result: Reconstruction) -> list[str]:
-    """What to do with the model."""
-    where = file_words(result.model.path, "MODEL")
+    """What to do with the model; first what may mend it."""
     recording = file_words(result.exploration.recording.path, "REC")
+    where = file_words(result.model.path, "MODEL")
+    given = {"files": (result.exploration.recording,), "save": where}
     return [
-        f"feel it: `palpate touch {where}`",
+        *(f"{way.says}: `{open_words(given, way.options)}`" for way in mending(result)),
+        feel_step(result.model.path, f"palpate reconstruct {recording} -o MODEL"),
         f"see what it leaves out: `palpate diagnose {recording} --model {where} --report PAGE.html`",
     ]
 
 
-def lost(result: Reconstruction) -> str:
-    """That a 1D model predicts places better that were held out, and what may help, before what else is said;
-    '' where none does."""
-    held_out = result.held_out
-    if held_out is None or not held_out.beaten_by:
-        return ""
+def mending(result: Reconstruction) -> list[Way]:
+    """Ways to an answer that can be relied on: another geometry where touches lie off the flat one that was
+    given, a field of the modulus where one is beaten by a 1D model."""
+    ways, held_out = [], result.held_out
+    if result.placed is not None and result.placed.doubt:
+        ways += [way for way in OF_A_KNOWN_OBJECT if "shape" in way.options]
     one = result.model.provenance["options"]["modulus_field"]["field"] == "homogeneous"
-    return (
-        f"{held_out.beaten_by}, a 1D model, errs by {mn(held_out.floor_n, '.2g')} at held-out places and "
-        f"this model by {mn(held_out.model_n, '.2g')}{' (--field auto may help)' if one else ''}; "
-    )
+    if one and held_out is not None and held_out.beaten_by:
+        ways.append(Way("let the modulus differ from place to place", {"field": "auto"}))
+    return ways
 
 
 def meaning(result: Reconstruction) -> str:

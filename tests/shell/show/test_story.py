@@ -87,3 +87,25 @@ def test_lists_names_and_quantities_read_as_one_says_them():
     )  # fmt: skip
     assert sure_kpa((27e3, 30e3), ".1f") == "95 % sure: 27.0 to 30.0 kPa"
     assert place_mm((0.01, -0.002, 0.08)) == "(10, -2, 80) mm"
+
+
+def test_headlines_are_short_and_name_no_flag():
+    """Of every story that has a page: the words that stand in a headline, a name or number counted as one."""
+    import ast
+    import re
+
+    from ...conftest import REPOSITORY
+
+    met = 0
+    for file in (REPOSITORY / "shell" / "show").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if not (isinstance(node, ast.Call) and ast.unparse(node.func) == "say.Headline"):
+                continue
+            if any(ast.unparse(each.value) == "say.TEXT" for each in node.keywords):
+                continue
+            (words,) = node.args
+            parts = words.values if isinstance(words, ast.JoinedStr) else [words]
+            text = "".join(str(part.value) if isinstance(part, ast.Constant) else "X" for part in parts)
+            met += 1
+            assert len(text.split()) <= 20 and not re.search(r"(?<!\w)--\w", text), f"{file.name}: {text}"
+    assert met > 10

@@ -7,8 +7,12 @@ import re
 import numpy as np
 import pytest
 
+import palpate as pp
 from palpate.mechanics.model.material import Ball
-from palpate.window.game import HALF_TIME_S, Game
+from palpate.render.surface.felt_surface import local_stiffness
+from palpate.scenes.scene import load_scene
+from palpate.window.game import HALF_TIME_S, PRESS_M, Game
+from palpate.window.stiffness import common_limits
 
 NODULE = Ball((0.014, 0.012, 0.030), 0.009, 8.0)
 UP = np.array([0.0, 0.0, 1.0])
@@ -28,7 +32,7 @@ def test_a_round(game: Game) -> None:
     assert answer.off_m == pytest.approx(0.009), "how deep it lies is not asked for"
     assert answer.score == pytest.approx(25.0)
     game.follow(True, 75.0)
-    assert game.answered and "25 points" in game.lines(80.0)[0], "a press that goes on is no new touch"
+    assert game.answered and "25 of 100 points" in game.lines(80.0)[0], "a press that goes on is no new touch"
     game.follow(False, 85.0)
     assert game.answered
     game.follow(True, 90.0)
@@ -42,11 +46,29 @@ def test_the_nearest_of_several_counts() -> None:
     assert game.answer(np.array([-0.02, 0.0, 0.06]), 0.0, "fem").score == pytest.approx(100.0)
 
 
+def test_the_nodule_shows_at_the_depth_that_the_words_name_and_not_under_springs() -> None:
+    """Over the nodule, against as high and as far from the middle; on the map in shares of its colours."""
+    scene = load_scene("nodule")
+    shares = {}
+    for name in ("fem", "hunt-crossley"):
+        renderer = pp.renderer(scene, name, progress=False)
+        stiffness = np.nan_to_num(local_stiffness(renderer, scene.tip_radius_m, PRESS_M))
+        low, high = common_limits([stiffness])
+        points = renderer.contact.arrays.vertices
+        top, away = points[:, 2] > 0.03, np.hypot(*(points[:, :2] - NODULE.centre_m[:2]).T)
+        over, else_ = (np.median(stiffness[top & where]) for where in (away < 0.004, away > 0.02))
+        shares[name] = (over - else_) / (high - low)
+        if name == "fem":
+            assert over > 1.1 * else_
+    assert shares["fem"] > 0.45 and shares["hunt-crossley"] < 0.25
+    assert f"{1e3 * PRESS_M:g} mm" in Game([NODULE], UP).lines(0.0)[0].replace("\u00a0", " ")
+
+
 def test_renderers_are_compared(game: Game) -> None:
     for renderer, off in (("fem", 0.0), ("hunt-crossley", 0.018), ("fem", 0.009)):
         game.follow(True, 0.0)
         game.follow(False, 0.0)
         game.answer(np.array([0.014 + off, 0.012, 0.0]), 0.0, renderer)
-    assert re.findall(r"(fem|hunt-crossley) (\d+) \w+ in (\d+)", game.lines(0.0)[1]) == [
+    assert re.findall(r"(fem|hunt-crossley) (\d+) of 100 points in (\d+)", game.lines(0.0)[1]) == [
         ("fem", "75", "2"), ("hunt-crossley", "25", "1"),
     ]  # fmt: skip

@@ -23,7 +23,6 @@ from palpate.scenes.scene import Scene, load_scene
 from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
 from palpate.window.panel import DEPTH
-from palpate.window.picture import STIFFNESS
 from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.widgets import BODY
 from palpate.window.window import COLUMN, TouchWindow
@@ -178,14 +177,26 @@ def test_colour_by_stiffness(driven: Driven) -> None:
     before = seen[-1]
     driven.key("c")
     surface = driven.window.pictures[0]._surface
-    driven.until(lambda f: STIFFNESS in surface.array_names)
-    values = surface[STIFFNESS]
+    driven.until(lambda f: driven.window.stiffness_drawn)
+    (name,) = [
+        name for name in surface.array_names if f"{1e3 * driven.window.pointer.press_depth_m:g} mm" in name
+    ]
+    values = surface[name]
     assert 20 < np.median(values) < 300
     changed = np.abs(pictures() - before).mean()
     assert changed > 5
     driven.key("c")
     # what is not felt is drawn by turns where drawing is slow
     driven.until(lambda f: np.abs(pictures() - before).mean() < 0.1 * changed)
+
+
+def test_escape_closes_what_is_open_and_never_the_session(driven: Driven) -> None:
+    for aside in ("h", "s", ""):
+        driven.key(aside) if aside else None
+        driven.key("Escape")
+        driven.says("Close", says=False)
+        driven.until(lambda f: True)
+        assert not driven.window.closed and driven.window.aside == ""
 
 
 def test_an_inclusion_is_dragged_and_felt(driven: Driven) -> None:

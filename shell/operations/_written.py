@@ -1,0 +1,59 @@
+"""A command as one would type it, of what was given by name; `palpate open` with what is added to go on."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+from palpate.mechanics.options import flag_of
+from palpate.operations._declare import written
+from palpate.operations._run import command_operation
+from palpate.show.page import file_words
+
+_GEOMETRIES = {"shape", "slab_m", "half_space"}
+
+
+def open_words(given: Mapping[str, Any], more: Mapping[str, Any]) -> str:
+    """The command `palpate open`. given: operands by name, and under "names" the column of each role; more:
+    what is added, a column by its role ('-fz': the negative of what is fz now). One geometry takes the place
+    of another."""
+    dropped = _GEOMETRIES if _GEOMETRIES & set(more) else set()
+    told = {name: value for name, value in given.items() if name not in {*dropped, "names"}}
+    for name, value in more.items():
+        if name == "columns":
+            value = {role: _named(text, given.get("names") or {}) for role, text in value.items()}
+        told[name] = {**(told.get(name) or {}), **value} if isinstance(value, Mapping) else value
+    return typed("open", told)
+
+
+def typed(name: str, given: Mapping[str, Any]) -> str:
+    """The command `palpate NAME` with operands by name."""
+    fields, operands, flags = command_operation(name)[0].fields, [], []
+    for each, value in given.items():
+        how = written(fields[each])
+        if how.positional:
+            several = value if isinstance(value, tuple) else (value,)
+            operands += [shlex.quote(file_words(getattr(v, "path", v), "REC")) for v in several]
+        else:
+            flags += _flag(flag_of(fields[each]), value, how.count == "repeat")
+    return " ".join(["palpate", name, *operands, *flags])
+
+
+def _named(text: str, names: Mapping[str, str]) -> str:
+    """A column as the file calls it; a sign that it has there is turned."""
+    role = text.removeprefix("-")
+    name = names.get(role) or role
+    turned = text.startswith("-") != name.startswith("-")
+    return f"{'-' * turned}{name.removeprefix('-')}"
+
+
+def _flag(flag: str, value: Any, repeated: bool) -> list[str]:
+    if value is None or value is False or value == "" or value == {}:
+        return []
+    if value is True:
+        return [flag]
+    if isinstance(value, Mapping):
+        pairs = [f"{key}={each}" for key, each in value.items()]
+        return [f"{flag} {shlex.quote(each)}" for each in (pairs if repeated else [",".join(pairs)])]
+    return [f"{flag} {shlex.quote(f'{value:g}' if isinstance(value, float) else str(value))}"]

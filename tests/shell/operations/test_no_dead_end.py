@@ -1,0 +1,172 @@
+"""What is refused says how to go on with the same file: the command is there and gets further."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import palpate as pp
+import palpate.show
+from palpate.cli import main
+from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.recording.recording import write_recording
+from palpate.operations._list import OPERATIONS
+from palpate.operations._run import parser_of
+from palpate.operations._written import open_words
+from palpate.reconstruction.checks.registry import looked_at
+from palpate.show import next_lines
+
+from ...conftest import REPOSITORY, modules_of
+from ...reconstruct.exploration_of_cylinder import explore_cylinder
+from ...reconstruct.flat_ground import MODULUS_PA, TIP_M, raster
+from ...support.faults import FAULTS
+from ..importing.test_meaning import write
+
+OF_OPEN = ("palpate.reconstruction.", "palpate.importing.", "palpate.mechanics.shape.flat_foot")
+"""Modules whose refusals `palpate open` passes on."""
+MENDED = (
+    "force in grams", "position in inches", "time in ms", "force axes swapped",
+    "position mirrored", "force sign flipped", "rate said a tenth",
+)  # fmt: skip
+EVERYDAY = ("position in inches", "force axes swapped", "rate said a tenth")
+FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
+
+
+def said_in(tree: ast.AST) -> list[str]:
+    """The words of every error that is raised, names in them as X."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Raise) and node.exc is not None:
+            parts = [
+                each
+                for each in ast.walk(node.exc)
+                if isinstance(each, ast.Constant) and isinstance(each.value, str)
+            ]
+            found.append(" ".join(str(part.value) for part in parts))
+    return found
+
+
+def strings_of(tree: ast.AST) -> list[str]:
+    """Every text of a module that is not documentation, names in it as X."""
+    found = []
+    inside = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    documentation = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            found.append("".join(str(getattr(part, "value", "X")) for part in node.values))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            found += [node.value] if id(node) not in inside | documentation else []
+    return found
+
+
+def flags_of(command: str) -> set[str]:
+    return {flag for action in parser_of(command)._actions for flag in action.option_strings}
+
+
+@pytest.fixture(scope="module")
+def sources() -> dict[str, str]:
+    return {name: path.read_text(encoding="utf-8") for name, path in modules_of(REPOSITORY).items()}
+
+
+def test_a_command_that_is_named_is_there_and_takes_the_flags_named_with_it(sources):
+    known = {command: flags_of(command) for command in OPERATIONS}
+    named, met = re.compile(r"[`']palpate ([a-z][a-z-]*)([^`']*)[`']"), 0
+    for module, text in sources.items():
+        for words in strings_of(ast.parse(text)):
+            for command, rest in named.findall(words):
+                if command == "bench":  # which hands its words on
+                    continue
+                assert command in known, f"{module}: no command {command}"
+                for flag in FLAG.findall(rest):
+                    met += 1
+                    assert flag in known[command], f"{module}: palpate {command} does not take {flag}"
+    assert met > 15
+
+
+def test_open_takes_every_flag_that_a_refusal_of_it_names(sources):
+    taken, met = flags_of("open"), set()
+    for module, text in sources.items():
+        if module.startswith(OF_OPEN):
+            for words in said_in(ast.parse(text)):
+                met |= {(flag, module) for flag in FLAG.findall(words)}
+    assert {"--slab", "--shape", "--half-space", "--poisson-ratio", "--sink", "--rate"} <= {f for f, _ in met}
+    assert not [each for each in met if each[0] not in taken]
+
+
+@pytest.mark.parametrize(
+    "fault", [pytest.param(f, marks=[pytest.mark.release] * (f not in EVERYDAY)) for f in MENDED]
+)
+def test_a_grave_finding_is_gone_by_a_way_that_it_names(fault, tmp_path, monkeypatch):
+    class Reached(Exception):
+        pass
+
+    def reconstruct(*_, **__):
+        raise Reached
+
+    monkeypatch.setattr("palpate.operations.reconstruct.reconstruct", reconstruct)
+    recording = FAULTS[fault].change(explore_cylinder()[0], np.random.default_rng(0))
+    file = write_recording(tmp_path / "wrong.csv", recording)
+    try:
+        said = "\n".join(next_lines(pp.open(str(file), progress=False).result))
+    except RecordingError as error:
+        said = str(error)
+    words = shlex.split(re.search(r"palpate open [^'\n]*", said)[0])
+    with pytest.raises(Reached):
+        main([*words[1:], "--report", "none"])
+
+
+def test_every_way_of_every_fault_is_a_command_that_open_takes(tmp_path):
+    recording, parser = explore_cylinder()[0], parser_of("open")
+    for fault in ("|force|", "dead force axis", "10 Hz", "force 200 ms late"):
+        found, _ = looked_at(FAULTS[fault].change(recording, np.random.default_rng(0)))
+        for finding in (f for f in found if f.grave):
+            assert finding.ways, finding.name
+            for way in finding.ways:
+                words = open_words({"files": ("a b.csv",), "columns": {"fz": "-Load (N)"}}, way.options)
+                assert parser.parse_args(shlex.split(words)[2:]).files == ["a b.csv"]
+
+
+def robots_log(folder: Path) -> Path:
+    """Presses on flat ground, no foot traced, in mm and grams, with a driver's names."""
+    recording = raster((4, 4))
+    header = "stamp,tcp_px [mm],tcp_py [mm],tcp_pz [mm],ft_x [gf],ft_y [gf],ft_z [gf]"
+    columns = [recording.t, 1e3 * recording.position, recording.force_on_tool / 9.80665e-3]
+    return write(folder / "robot.csv", columns, header)
+
+
+def test_a_log_without_a_foot_is_told_the_commands_that_go_on_with_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    robots_log(tmp_path)
+    assert main(["open", "robot.csv", "--tip-radius", str(TIP_M)]) == 1
+    commands = re.findall(r"palpate open robot.csv.*", capsys.readouterr().out)
+    assert len(commands) == 3
+    for command, flag in zip(commands, ("--shape", "--slab", "--half-space"), strict=True):
+        assert f"--tip-radius {TIP_M:g}" in command and flag in command
+        assert parser_of("open").parse_args(shlex.split(command)[2:])
+    page = (tmp_path / "robot-palpate.html").read_text()
+    assert all(f"--tip-radius {TIP_M:g} {flag}" in page for flag in ("--shape", "--slab", "--half-space"))
+
+
+@pytest.mark.slow
+def test_the_command_that_is_told_reaches_the_truth(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    robots_log(tmp_path)
+    main(["open", "robot.csv", "--tip-radius", str(TIP_M), "--report", "none"])
+    (command,) = [c for c in re.findall(r"palpate open robot.csv.*", capsys.readouterr().out) if "half" in c]
+    assert main([*shlex.split(command)[1:], "--report", "none"]) == 0
+    said = capsys.readouterr().out
+    assert float(re.search(r"modulus ([\d.]+) kPa", said)[1]) == pytest.approx(MODULUS_PA / 1e3, rel=0.05)
+    # no folder was written, so none is named as if it were there
+    assert "palpate touch MODEL" not in said or "--output MODEL" in said
+
+
+def test_what_says_nothing_of_such_a_file_is_refused(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((40, 40, 20)).export(tmp_path / "box.stl")
+    with pytest.raises(OptionError, match="--slab"):
+        pp.open(tmp_path / "box.stl", slab_m=0.02, progress=False)
