@@ -116,14 +116,14 @@ class Patterns:
         white, plain = self.white.with_column(1 + true, factor), self.plain.with_column(1 + true, factor)
         gains = white.gains()
         mine = self.scored(number, white, plain, gains)
-        rest = np.array([gains[:, self.own == k].max(axis=1) for k in range(len(self.effects))])
+        rest = np.array([gains[:, self.own == k].max(axis=1, initial=0.0) for k in range(len(self.effects))])
         near = (rest > CLOSE * rest[number]).any(axis=1)
         named = mine.passes.copy()
         best, most = mine.odds.copy(), np.where(mine.passes, mine.gain, -np.inf)
         others = []
-        for k in np.flatnonzero(near):
+        for k in np.flatnonzero(near).tolist():
             if k != number and not of_one_phenomenon(self.effects[k], [self.effects[number]]):
-                other = self.scored(int(k), white, plain, gains)
+                other = self.scored(k, white, plain, gains)
                 others.append(other)
                 best = np.where(other.passes, np.maximum(best, other.odds), best)
         doubt = self.search.options.beyond_doubt

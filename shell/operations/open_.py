@@ -66,7 +66,7 @@ def open(
     ] = None,
     units: Units = None,
     force_on: Annotated[
-        str | None, option("body on which the force acts", choices=("tool", "object"))
+        str | None, option("body on which the force acts", choices=("tool", "object"), advanced=True)
     ] = None,
     travel: Annotated[
         str | None, option("which way a machine's position counts", choices=("into", "out"), advanced=True)
@@ -78,7 +78,7 @@ def open(
     clock: ClockOfRows = None,
     rate_hz: Annotated[
         float | None,
-        option("rate to resample a log to, or rate of rows without a time", unit="Hz"),
+        option("rate to resample a log to, or rate of rows without a time", unit="Hz", advanced=True),
     ] = None,
     offset_s: Annotated[float | str | None, offset_option()] = None,
     layer_m: Annotated[

@@ -32,8 +32,11 @@ class Shown(Controlled, Protocol):
     scene: Scene
     controls: Controls
     aside: str
-    stiffness_drawn: bool
     moved_by_mouse: bool
+
+    @property
+    def stiffness_drawn(self) -> bool:
+        """Whether the object is coloured by its stiffness."""
 
     def next_words(self, frame: Frame) -> str:
         """What to do next."""
