@@ -44,11 +44,15 @@ RecordingArgument = Annotated[
 Seed = Annotated[int, option("seed of every random choice", low=0, high=2**63 - 1, parse=natural)]
 Renders = Annotated[str, option("which renderer computes the force", choices=(*names(), *simulator_names()))]
 """A renderer: ours, or another simulator."""
-Units = Annotated[
-    "Mapping[str, str] | None",
-    option("units of the columns; kinds: position, force, time", metavar="KIND=UNIT,...", parse=_split),
-]
-"""In Python {kind: unit}."""
+
+
+def units_option(*, advanced: bool = False) -> Mapping[str, Any]:
+    """--units; in Python {kind: unit}."""
+    words = "units of the columns; kinds: position, force, time"
+    return option(words, metavar="KIND=UNIT,...", parse=_split, advanced=advanced)
+
+
+Units = Annotated["Mapping[str, str] | None", units_option()]
 TipForm = Annotated[
     str | None,
     option(

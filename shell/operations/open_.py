@@ -25,12 +25,12 @@ from palpate.operations._shared import (
     Seed,
     TipAngle,
     TipForm,
-    Units,
     columns_option,
     named,
     offset_option,
     report_option,
     save_option,
+    units_option,
 )
 from palpate.reconstruction.methods import ReconstructOptions
 
@@ -64,7 +64,7 @@ def open(
         Mapping[str, str] | None,
         columns_option("as of import; of curves t, depth (or height), load", advanced=True),
     ] = None,
-    units: Units = None,
+    units: Annotated[Mapping[str, str] | None, units_option(advanced=True)] = None,
     force_on: Annotated[
         str | None, option("body on which the force acts", choices=("tool", "object"), advanced=True)
     ] = None,
@@ -78,7 +78,7 @@ def open(
     clock: ClockOfRows = None,
     rate_hz: Annotated[
         float | None,
-        option("rate to resample a log to, or rate of rows without a time", unit="Hz", advanced=True),
+        option("rate to resample a log to, or rate of rows without a time", unit="Hz"),
     ] = None,
     offset_s: Annotated[float | str | None, offset_option()] = None,
     layer_m: Annotated[

@@ -34,6 +34,7 @@ CONTRACT = {
     "import": "-o",
     "export": "--to -o",
     "calibrate": "-o",
+    "open": "--shape --slab --half-space --sink --poisson-ratio --rate --tip --tip-radius --tip-angle",
 }
 """Flags that others were promised: help always shows them."""
 RANDOM = ("reconstruct", "compare", "diagnose", "touch", "simulate", "batch", "explore", "open", "material")
