@@ -10,6 +10,7 @@ import numpy as np
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.errors import ModelError
+from palpate.mechanics.law_errors import DepthLaw, Stiffness
 from palpate.mechanics.model.one_d_laws import LAWS, RIVALS, Fits, OneDLaws, forces_of, spread_law
 from palpate.mechanics.presses.table import Presses
 from palpate.reconstruction.steps.s6_one_d import columns, fit_robust, low_passed
@@ -19,6 +20,9 @@ from palpate.reconstruction.steps.s7_modulus.press_fit import touched_as_fitted
 _BLOCK_S = 0.004
 BETTER = 0.95
 """Share of an error below which another is called smaller."""
+OWN = 1.96 * float(np.hypot(Stiffness.diagnosis.value, DepthLaw.diagnosis.value))
+"""Share of the force that our own law may be off by (95 %): a 1D model that learnt from presses has no such
+error, so an excess below it says nothing against the model."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class HeldOutErrors:
     model_n: of the model, its modulus, or field of it, told by the other places. constant_n: of their mean
     push along the normal, whatever the depth. floor_n: of the better 1D model, whose name is `floor`, spread
     from the other places. behind: by how many standard errors over places (paired) the model's mean square
-    exceeds the floor's.
+    exceeds the floor's. force_n: of what was measured.
     """
 
     model_n: float
@@ -36,16 +40,18 @@ class HeldOutErrors:
     floor: str = ""
     floor_n: float = float("nan")
     behind: float = float("-inf")
+    force_n: float = float("nan")
 
     @property
     def doubt(self) -> str:
-        """Why the model is not reliable; '' where it predicts, and no 1D model does so better."""
+        """Why the model is not reliable; '' where it predicts, and no 1D model does so better by more than
+        our own law may be off."""
         if self.model_n > self.constant_n:
             return (
                 f"the model does not predict: on places that were held out it errs by {self.model_n:.3g} N, "
                 f"a constant push by {self.constant_n:.3g} N"
             )
-        if not self.beaten_by:
+        if not self.beaten_by or self.model_n**2 - self.floor_n**2 < (OWN * self.force_n) ** 2:
             return ""
         return (
             f"a 1D model predicts better: on places that were held out {self.beaten_by} errs by "
@@ -98,8 +104,9 @@ def held_out(
     worse = np.bincount(data.site[data.press], weights=missed - floors[floor])
     error = float(np.sqrt(len(worse)) * worse.std(ddof=1))
     return HeldOutErrors(
-        _rms(missed), constant, floor, _rms(floors[floor]), float(worse.sum()) / max(error, 1e-300)
-    )
+        _rms(missed), constant, floor, _rms(floors[floor]), float(worse.sum()) / max(error, 1e-300),
+        force_n=_rms((data.force**2).sum(axis=1)),
+    )  # fmt: skip
 
 
 def _constant(data: Presses) -> np.ndarray:
