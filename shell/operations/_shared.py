@@ -63,7 +63,7 @@ TipForm = Annotated[
 """A sphere and a flat punch have a radius, the others an angle."""
 TipAngle = Annotated[
     float | None,
-    option("half angle of a cone or pyramid, axis to flank", unit="degrees", flag="--tip-angle"),
+    option("half angle of a cone or pyramid, axis to flank", unit="deg", flag="--tip-angle"),
 ]
 ClockOfRows = Annotated[
     str | None,

@@ -156,7 +156,7 @@ def test_a_press_deeper_than_the_object_or_without_end_is_refused(monkeypatch):
 
     monkeypatch.setattr("palpate.render.press.scene_of", lambda touched: touched)
     up = np.array([0.0, 0.0, 1.0])
-    monkeypatch.setattr("palpate.render.press.first_touch", lambda *_: (0.035 * up, up))
+    monkeypatch.setattr("palpate.render.press.first_touch", lambda *_: (0.035 * up, up, False))
     for words, stroke, radius in (
         ("the object is 0.03 m high", Stroke(4.0, 0.01), None),
         ("tip's radius is 1e.30", Stroke(1e-3, 0.01), 1e30),
