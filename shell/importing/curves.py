@@ -116,7 +116,8 @@ def _raw(
     path: Path, tables: list[Table], said: SaidOfCurves, notes: list[str], odds: list[float]
 ) -> RawCurves:
     found = find_columns(tables, Said(columns=said.columns, units=said.units))
-    columns = {role: found[role] for role in ("t", "z", "fz") if role in found}
+    of_curves: tuple[str, ...] = ("t", "z", "fz")
+    columns = {role: found[role] for role in of_curves if role in found}
     z, push = (np.asarray(columns[role].values, float) for role in ("z", "fz"))
     t = np.asarray(columns["t"].values, float) if "t" in columns else np.arange(z.size) / _UNTIMED_HZ
     if t.ndim == 0 or z.ndim == 0 or push.ndim == 0 or len({len(t), len(z), len(push)}) > 1:
