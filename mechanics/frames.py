@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+_NO_LENGTH = 1e-12
+"""Of what is about 1 long where it has a direction."""
+
 
 def local_frames(normals: np.ndarray) -> np.ndarray:
     """(k, 3, 3) rows n, u, v of each outward unit normal (k, 3): they turn a device vector into the local
@@ -16,6 +19,15 @@ def local_frames(normals: np.ndarray) -> np.ndarray:
     u = np.cross(helper, normals)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
     return np.stack([normals, u, np.cross(normals, u)], axis=1)
+
+
+def unit_vectors(vectors: np.ndarray, instead: np.ndarray) -> np.ndarray:
+    """(k, 3): vectors (k, 3) of unit length; `instead`, unit vectors, of those without length or number."""
+    length = np.linalg.norm(vectors, axis=1)
+    there = length > _NO_LENGTH
+    result = np.array(np.broadcast_to(instead, vectors.shape), dtype=float)
+    result[there] = vectors[there] / length[there, None]
+    return result
 
 
 def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

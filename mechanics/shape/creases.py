@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.shape.nearest import neighbours
 
 CREASE_DEGREES = 35.0
@@ -40,6 +41,8 @@ def facets_of(vertices: np.ndarray, triangles: np.ndarray) -> Facets:
     edge = np.roll(p, -1, axis=1) - p
     height = twice[:, None] / np.maximum(np.linalg.norm(edge, axis=2), 1e-300)
     across = neighbours(triangles)
+    flat = twice == 0.0  # such a sliver faces as those around it
+    unit[flat] = unit_vectors(unit[across[flat]].sum(axis=1), np.array([0.0, 0.0, 1.0]))
     turn = angle_between(unit[:, None], unit[across])
     start = np.argmax(triangles[across] == np.roll(triangles, -1, axis=1)[..., None], axis=2)
     other = height[across, start]

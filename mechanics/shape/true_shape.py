@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.disk.store import content_key
+from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.shape.creases import Facets, angle_between, corner_normals_of, facets_of
 from palpate.mechanics.shape.nearest import closest
 
@@ -91,7 +92,8 @@ class TrueShape:
         """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""
         points = np.einsum("kb,kbx->kx", _bernstein(weights), self._control[triangle])
         normals = np.einsum("kc,kcx->kx", weights, self.corner_normals[triangle])
-        return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        # corners that look opposite ways, at the end of a crease, leave their triangle's own
+        return points, unit_vectors(normals, self._facets.unit[triangle])
 
     def foot(self, points: np.ndarray, facing: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape nearest to points (k, 3), unit normals (k, 3) there.

@@ -14,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.surface.triangles import cut, cut_beside, pseudonormals
 
@@ -34,6 +35,7 @@ _HOLLOW_REACH_M = 3 * NORMAL_SMOOTHING_M
 _REACH = 0.75  # fine edges from which a vertex is drawn onto a crease that its triangle crosses
 _CROSSES = np.cos(np.radians(25))
 _ROUNDS, _HALVINGS = 4, 3
+_NO_AREA = 1e-5  # of a fine edge squared, twice the area of a triangle that has none
 _ALIKE = 0.8
 _MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
 
@@ -167,14 +169,18 @@ def _on_creases(
         return creased
     tree = cKDTree(samples)
     away, nearest = tree.query(placed)
+    before = placed.copy()
     start = np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2)
     pairs = np.unique(np.sort(start, axis=1), axis=0)
-    wanted = np.zeros(len(placed), dtype=bool)
+    wanted, taken = np.zeros(len(placed), dtype=bool), np.zeros(len(samples), dtype=bool)
     wanted[rim] = away[rim] < edge_m
     for _ in range(_ROUNDS):
-        for vertex in np.flatnonzero(wanted):
-            creased[vertex] = True
-            placed[vertex] = samples[nearest[vertex]]
+        # one vertex a sample, the nearest: at the end of a crease several have the same one
+        vertices = np.flatnonzero(wanted & ~taken[nearest])
+        vertices = vertices[np.argsort(away[vertices], kind="stable")]
+        vertices = vertices[np.unique(nearest[vertices], return_index=True)[1]]
+        creased[vertices], taken[nearest[vertices]] = True, True
+        placed[vertices] = samples[nearest[vertices]]
         a, b = pairs.T
         crosses = np.einsum("kx,kx->k", normals[a], normals[b]) < _CROSSES
         crosses &= ~creased[a] & ~creased[b]
@@ -183,7 +189,29 @@ def _on_creases(
         wanted[nearer[away[nearer] < _REACH * edge_m]] = True
         if not wanted.any():
             break
+    _given_back(placed, before, creased, away, touch, edge_m)
     return creased
+
+
+def _given_back(
+    placed: np.ndarray,
+    before: np.ndarray,
+    creased: np.ndarray,
+    away: np.ndarray,
+    touch: np.ndarray,
+    edge_m: float,
+) -> None:
+    """Put vertices back to where they were whose triangles lost their area on a crease, the one that came
+    from farthest first: `placed` and `creased` change."""
+    for _ in range(3):
+        p = placed[touch]
+        twice = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+        flat = touch[(twice < _NO_AREA * edge_m**2) & creased[touch].any(axis=1)]
+        if not len(flat):
+            return
+        farthest = np.argmax(np.where(creased[flat], away[flat], -1.0), axis=1)
+        back = np.unique(flat[np.arange(len(flat)), farthest])
+        placed[back], creased[back] = before[back], False
 
 
 def _lifted(
@@ -233,16 +261,14 @@ def _eased(
     # round faces agree better than that: the mean would draw them inwards
     share = _smooth_step((flat - agreement) / (flat - crease))[:, None]
     moved[own] += share * (mean(places, _HOLLOW_ROUNDING_M) - placed[own])
-    facing = mean(unit, NORMAL_SMOOTHING_M)
-    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    facing = unit_vectors(mean(unit, NORMAL_SMOOTHING_M), normals[own])
     turned[own] = _towards(normals[own], facing, _smooth_step(3 - near / NORMAL_SMOOTHING_M))
     return moved, turned
 
 
 def _towards(normals: np.ndarray, facing: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """(k, 3) unit, turned by a share (k,) of the way from `normals` (k, 3) to `facing` (k, 3)."""
-    turned = normals + share[:, None] * (facing - normals)
-    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    """(k, 3) unit, turned by a share (k,) of the way from `normals` (k, 3) to `facing` (k, 3), both unit."""
+    return unit_vectors(normals + share[:, None] * (facing - normals), facing)
 
 
 def _smooth_step(x: np.ndarray) -> np.ndarray:

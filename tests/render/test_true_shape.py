@@ -6,7 +6,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+import trimesh
 
+from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.shape.nearest import neighbours, sample
 from palpate.mechanics.shape.tetmesh import TetMesh
@@ -85,6 +87,45 @@ def test_a_sharp_rim_stays_where_it_is_and_only_beside_it_the_normal_turns():
         assert n[top & (inwards > 2.05e-3), 2].min() > 1 - 1e-9
         rim = top & (inwards < 1e-5)
         assert n[rim, 2] == pytest.approx(np.full(rim.sum(), np.sqrt(0.5)), abs=0.03)
+
+
+def test_a_crease_that_fades_leaves_no_triangle_without_area_and_no_normal_without_length():
+    """A block with a roof on it: several fine vertices have the same end of its ridge as nearest crease."""
+
+    def roof(p: np.ndarray) -> np.ndarray:
+        x, y = np.abs(p[:, 0]), np.abs(p[:, 1])
+        return 0.01 * np.clip(1 - y / 0.015, 0, 1) * np.clip(1 - x / 0.02, 0, 1)
+
+    box = trimesh.creation.box(extents=(0.06, 0.06, 0.03))
+    for _ in range(3):
+        box = box.subdivide()
+    vertices = box.vertices + [0, 0, 0.015]
+    vertices[:, 2] += vertices[:, 2] / 0.03 * roof(vertices)
+    mesh = shapes.block((0.06, 0.06, 0.03), (5, 5, 3), order=1)
+    points = mesh.points.copy()
+    points[:, 2] += np.isclose(points[:, 2], 0.03) * roof(points)
+    shape = TrueShape(vertices, np.asarray(box.faces))
+    felt = contact_surface(TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable, shape)).arrays
+    touched = felt.triangles[felt.free > 0]
+    corner = felt.vertices[touched]
+    twice = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    assert twice.min() > 1e-11
+    normals = felt.normals[np.unique(touched)]
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-12)
+    assert np.isfinite(shape.curvatures(felt.vertices[np.unique(touched)], normals, 0.002)[0]).all()
+
+
+def test_a_direction_that_is_none_is_that_of_what_is_around():
+    up, along = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    given = np.array([2 * along, np.zeros(3), np.full(3, np.nan), 1e-14 * along])
+    np.testing.assert_array_equal(unit_vectors(given, np.tile(up, (4, 1))), [along, up, up, up])
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 1], [0.5, 0, 0]]) * 0.05
+    # the edge of the foot has a corner more on one side: a triangle without area closes it
+    faces = [[0, 2, 1], [0, 3, 2], [0, 5, 4], [5, 1, 4], [0, 1, 5], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    shape = TrueShape(corners, np.array(faces))
+    _, normals = shape.on(np.array([4]), np.array([[0.2, 0.3, 0.5]]))
+    assert np.linalg.norm(normals[0]) == pytest.approx(1.0)
+    assert normals[0, 1] < 0, "it faces as what is beside it"
 
 
 def test_curvatures_are_the_shapes_and_not_the_meshs():
