@@ -52,7 +52,7 @@ def test_python_calls_nothing_that_is_compiled_for_kernels_alone(texts):
         for node in ast.walk(tree)
         if isinstance(node, ast.FunctionDef) and decorators(node) & ALONE
     }
-    assert ("palpate.render.fem.stick_slip", "settle") in alone
+    assert ("palpate.render.fem.careful_slip", "settle") in alone
     wrong = []
     for module, tree in those_with(texts, rf"\b({'|'.join({name for _, name in alone})})\b").items():
         seen = {
