@@ -24,7 +24,7 @@ from palpate.diagnosis.search.attribution import attribute
 from palpate.diagnosis.search.descent import misfit_of
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.gaps import modulus_share
+from palpate.diagnosis.search.gaps import beside_modulus_n
 from palpate.diagnosis.search.limits import detectable, forms_of
 from palpate.diagnosis.search.rivals import of_one_phenomenon
 from palpate.diagnosis.search.whiten import nuisance_columns
@@ -90,9 +90,8 @@ def _of_size(found: Findings, own: Effect, form: np.ndarray, size_n: float) -> n
     def size(share: float) -> float:
         settings = settings_of(forward, base.effects, base.values, base.onset)
         own.act(settings, np.clip(own.ideal + share * (form - own.ideal), *own.bounds), forward)
-        change = (np.nan_to_num(forward.predict(settings)) - before)[counted]
-        change -= modulus_share(change, before[counted]) * before[counted]
-        return float(np.sqrt((change**2).sum(axis=1).mean()))
+        change = np.nan_to_num(forward.predict(settings)) - before
+        return beside_modulus_n(change[counted], before[counted])
 
     low, high = 0.0, 1.0
     while size(high) < size_n:

@@ -19,6 +19,12 @@ def modulus_share(change: np.ndarray, force: np.ndarray) -> float:
     return float((change * force).sum() / max((force**2).sum(), 1e-300))
 
 
+def beside_modulus_n(change: np.ndarray, force: np.ndarray) -> float:
+    """N, rms of a change (n, 3) of a force (n, 3) N, with what another modulus takes up left out."""
+    own = change - modulus_share(change, force) * force
+    return float(np.sqrt((own**2).sum(axis=1).mean()))
+
+
 def closed_share(
     before: np.ndarray,
     after: np.ndarray,

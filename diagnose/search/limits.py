@@ -12,10 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.gaps import RESAMPLES, modulus_share
+from palpate.diagnosis.search.gaps import RESAMPLES, beside_modulus_n, closed_share
 from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import WEIGHTS
 from palpate.diagnosis.search.rivals import of_one_phenomenon
@@ -77,8 +78,7 @@ class Patterns:
                 effect.act(settings, form, forward)
                 change = np.nan_to_num(forward.predict(settings)) - before
                 change[~counted] = 0.0
-                felt = change - modulus_share(change[counted], before[counted]) * before
-                rms = float(np.sqrt((felt[counted] ** 2).sum(axis=1).mean()))
+                rms = beside_modulus_n(change[counted], before[counted])
                 if rms > 0:
                     columns.append(_without_first_touches(search, change) if fitted else change)
                     own.append(number)
@@ -154,26 +154,18 @@ class Patterns:
         if not lump:
             left = np.where(predicted, left, was)
         closure = self._closed(was, left, lump, options.doubt)
-        odds = (
-            WEIGHTS.offset
-            + WEIGHTS.evidence * np.log10(np.maximum(evidence, 1.0))
-            + WEIGHTS.closure * np.clip(closure, -1, 1)
-        )
-        sure = np.log(options.sure / (1 - options.sure)) if 0 < options.sure < 1 else 0.0
-        return Linear((closure > 0) & (odds > sure), odds, gain)
+        odds = WEIGHTS.log_odds(evidence, closure)
+        return Linear((closure > 0) & (expit(odds) > options.sure), odds, gain)
 
     def _closed(self, was: np.ndarray, left: np.ndarray, lump: bool, doubt: float) -> np.ndarray:
         """(d,) the share of the gap that is closed; but for a lump at least, over resampled groups."""
         noise, least = 3 * self.search.forward.touches.noise_n**2, self.search.smallest_n**2
-
-        def share(weights: np.ndarray) -> np.ndarray:
-            n = weights @ self.counts
-            before, after = (weights @ x.T / n[:, None] for x in (was, left))
-            return (before - after) / np.maximum(before - noise, least)
-
         if lump:
-            return share(np.ones((1, len(self.counts))))[0]
-        return np.quantile(share(self.weights), doubt, axis=0)
+            return closed_share(was, left, self.counts, noise, least)
+        # sums of resampled groups, by products: (resamplings, d) each
+        n = (self.weights @ self.counts)[:, None, None]
+        before, after = ((self.weights @ x.T)[:, :, None] for x in (was, left))
+        return np.quantile(closed_share(before, after, n, noise, least), doubt, axis=0)
 
 
 @dataclass(frozen=True)

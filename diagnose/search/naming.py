@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from palpate.diagnosis.search.leave_one_out import JudgedSet
@@ -28,11 +29,11 @@ class Weights:
     evidence: float
     closure: float
 
-    def log_odds(self, gain: float, closes: float) -> float:
-        """That an effect is there. gain: log likelihood, of held-out places. closes: share of the gap."""
-        return float(
-            self.offset + self.evidence * np.log10(max(gain, 1.0)) + self.closure * np.clip(closes, -1, 1)
-        )
+    def log_odds(self, gain: ArrayLike, closes: ArrayLike) -> np.ndarray:
+        """(...) that an effect is there. gain: log likelihood, of held-out places. closes: share of the
+        gap."""
+        evidence = np.log10(np.maximum(gain, 1.0))
+        return np.asarray(self.offset + self.evidence * evidence + self.closure * np.clip(closes, -1, 1))
 
 
 FILE = Path(__file__).with_name("naming.toml")
@@ -85,7 +86,7 @@ class Score:
     @property
     def log_odds(self) -> float:
         """That it is there, rather than an error of our own law."""
-        return WEIGHTS.log_odds(self.evidence, self.closure)
+        return float(WEIGHTS.log_odds(self.evidence, self.closure))
 
     @property
     def probability(self) -> float:
@@ -95,4 +96,4 @@ class Score:
     @property
     def may_be(self) -> bool:
         """Whether it would be as likely as not if it closed the whole gap."""
-        return WEIGHTS.log_odds(self.evidence, 1.0) > 0
+        return float(WEIGHTS.log_odds(self.evidence, 1.0)) > 0

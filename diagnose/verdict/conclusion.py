@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from palpate.diagnosis.search.fit import parameter_intervals
-from palpate.diagnosis.search.gaps import closed_share, closed_share_ci95, gap, modulus_share
+from palpate.diagnosis.search.gaps import beside_modulus_n, closed_share, closed_share_ci95, gap
 from palpate.diagnosis.search.limits import detectable
 from palpate.diagnosis.search.rivals import alike
 from palpate.diagnosis.search.site_stiffness import repeat_scatter
@@ -214,8 +214,7 @@ def entries_of(
     plain = (forward.touches.local_force - found.base.residual)[counted]
 
     def felt(change: np.ndarray) -> float:
-        own = change[counted] - modulus_share(change[counted], plain) * plain
-        return float(np.sqrt((own**2).sum(axis=1).mean()))
+        return beside_modulus_n(change[counted], plain)
 
     entries = []
     for name, (score, p) in found.scored.items():
