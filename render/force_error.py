@@ -82,7 +82,7 @@ def place_numbers(
     radius; how far a push along the normal moves the surface sideways, as compliance times the tip's radius
     and the modulus; how near a rim and how near the base it is (mechanics.contact.edges.nearness)."""
     surface, mesh, parameters = renderer.contact.arrays, renderer.model.mesh, renderer.parameters
-    points, normals, far = surface.vertices[vertices], surface.normals[vertices], parameters.far[vertices]
+    points, normals, far = surface.vertices[vertices], surface.normals[vertices], renderer.far_at(vertices)
     along = np.einsum("vab,vb->va", far, normals)
     sideways = np.linalg.norm(along - np.einsum("va,va->v", along, normals)[:, None] * normals, axis=1)
     bent = np.abs(parameters.curvature[vertices])

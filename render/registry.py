@@ -50,11 +50,22 @@ def check_settings(name: str, settings: str, numbers: str) -> None:
 
 
 def create(
-    name: str, model: Model, options: RenderOptions | None = None, progress: Progress = silent
+    name: str,
+    model: Model,
+    options: RenderOptions | None = None,
+    progress: Progress = silent,
+    *,
+    on_demand: bool = False,
 ) -> Renderer:
-    """The renderer of that name for a model; raises OptionError for a name that is not there."""
+    """The renderer of that name for a model; raises OptionError for a name that is not there.
+
+    on_demand: for one tip's path, headless: our finite-element renderer solves only the places that it comes
+    to.
+    """
     known = {**RENDERERS, **_SIMULATORS}
     if name not in known:
         raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(known)}")
     module = importlib.import_module(known[name])
+    if on_demand and hasattr(module, "create_on_demand"):
+        return module.create_on_demand(model, options or RenderOptions(), progress)
     return module.create(name, model, options or RenderOptions(), progress)

@@ -93,9 +93,13 @@ def compress(
 
 
 def own_compliance(solver: Solver, average: sp.csr_matrix) -> np.ndarray:
-    """(k, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; weights (k, n)."""
-    loads = unit_loads(average)
-    return solver.quadratic_forms(loads.reshape(-1, *loads.shape[2:])[solver.free])
+    """(k, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; weights (k, n).
+
+    A lone patch is solved twice: among others its last bit would be another.
+    """
+    k = average.shape[0]
+    loads = unit_loads(sp.vstack([average, average], format="csr") if k == 1 else average)
+    return solver.quadratic_forms(loads.reshape(-1, *loads.shape[2:])[solver.free])[:k]
 
 
 def own_blocks(

@@ -8,14 +8,19 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from palpate.mechanics.compliance.fine_corners import fine_corners, is_loose
+from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
-from palpate.mechanics.disk.store import content_key, load_or_build
+from palpate.mechanics.disk.store import content_key, load_or_build, read_arrays
 from palpate.mechanics.effects.hold import base_hold
 from palpate.mechanics.elastic.held_base import BaseHold
-from palpate.mechanics.errors import OptionError
+from palpate.mechanics.elastic.solver import Solver
+from palpate.mechanics.errors import CacheError, OptionError
+from palpate.mechanics.model.material import with_balls
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.options import option
 from palpate.mechanics.progress import Progress, silent
@@ -112,6 +117,44 @@ def load_or_condense(
         _unwritten.clear()
         _unwritten[key] = arrays
     return SurfaceCompliance.from_arrays(_unwritten[key])
+
+
+def load_or_solve(model: Model, progress: Progress = silent) -> SurfaceCompliance | OnDemandCompliance:
+    """The compliance of a model for one tip on few places: condensed where it is so already, else place by
+    place as it is asked for; both give the same bits.
+
+    A base that is loose in part is condensed: which of its places rest on the floor is found from place to
+    place over the whole surface.
+    """
+    hold = _hold(model)
+    condensed = _condensed(model)
+    if condensed is not None:
+        return condensed
+    if is_loose(hold):
+        return load_or_condense(model, progress)
+    mesh, nu, ratio = model.mesh, model.material.poisson_ratio, model.ratio_without_balls
+    balls = tuple(model.material.inclusions.values())
+    tip = model.tool.tip_radius_m
+    key = content_key("solved places 1", compliance_key(model, ComplianceOptions("dense")))
+    return OnDemandCompliance(
+        mesh,
+        nu,
+        partial(fine_corners, mesh, nu, ratio, balls=balls, hold=hold, tip_radius_m=tip),
+        lambda: Solver(mesh.quadratic(), nu, with_balls(mesh, ratio, balls) if balls else ratio, hold=hold),
+        key,
+        None if model.path is None else model.path / f"places-{key[:16]}.bin",
+    )
+
+
+def _condensed(model: Model) -> SurfaceCompliance | None:
+    """What `load_or_condense` gives where it has nothing to do."""
+    key = compliance_key(model)
+    try:
+        path = None if model.path is None else model.path / compliance_file(key)
+        arrays = _unwritten.get(key) if path is None else read_arrays(path, key)
+    except CacheError:
+        return None
+    return None if arrays is None else SurfaceCompliance.from_arrays(arrays)
 
 
 _unwritten: dict[str, dict[str, np.ndarray]] = {}

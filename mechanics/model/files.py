@@ -8,7 +8,9 @@ MODEL/shape.vtp        the object's surface itself, where it is known (mechanics
 MODEL/presses.bin      the table of presses, samples and all (mechanics.presses.table)
 MODEL/palpations.csv   one row a palpation, for people
 MODEL/surface.vtp      what a tip meets, written by the shell (render.surface.felt_surface), keyed by content
-MODEL/compliance-*.bin the cached compliance (mechanics.compliance.stored_compliance), keyed by content"""
+MODEL/compliance-*.bin the cached compliance (mechanics.compliance.stored_compliance), keyed by content
+MODEL/places-*.bin     that of single places (mechanics.compliance.on_demand), added to
+MODEL/contact-*.bin    the contact surface (render.surface.snapping), keyed by content"""
 
 from __future__ import annotations
 
@@ -95,6 +97,8 @@ MODEL = FolderKind(
         "surface.vtp",
         "*.cache",
         "compliance-*.bin",
+        "places-*.bin",
+        "contact-*.bin",
     ),
 )
 """What `write_model` writes, and what is kept beside it later."""

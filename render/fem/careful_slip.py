@@ -28,7 +28,8 @@ _PROBE, _FIRST, _LONGEST = 2e-4, 0.01, 0.25  # walks, in tip radii
 
 @part
 def settle(p, state, i):
-    """At the anchor of tip i: point, normal, frame, far field in that frame (m/N), effective radius."""
+    """At the anchor of tip i: point, normal, frame, far field in that frame (m/N), effective radius; and in
+    `state.unsolved` whether the far field is not solved there."""
     grip = state.grip
     t = grip.triangle[i]
     weights = grip.weights[i]
@@ -45,6 +46,10 @@ def settle(p, state, i):
         curvature += weights[corner] * p.curvature[v]
         bracing += weights[corner] * p.bracing[v]
         softness += weights[corner] * p.softness[v]
+        if np.isnan(p.far[v, 0, 0]):
+            if state.unsolved[0] < 0:
+                state.unsolved[0] = t
+            continue
         for r in range(3):
             for c in range(3):
                 local[r, c] += w * p.far[v, r, c]

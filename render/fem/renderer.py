@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from palpate.mechanics.compliance.near_field import surface_softness
+from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import principal_curvatures
-from palpate.mechanics.compliance.stored_compliance import load_or_condense
+from palpate.mechanics.compliance.stored_compliance import load_or_condense, load_or_solve
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.contact.edges import edge_law
 from palpate.mechanics.errors import OptionError
@@ -30,8 +32,11 @@ NAME = "fem"
 
 
 class FemRenderer(Renderer):
-    """Contact, stick and slip of several spherical tips with a linear elastic object; see
-    render.fem.kernel."""
+    """Contact, stick and slip of several spherical tips with a linear elastic object; see render.fem.kernel.
+
+    With an OnDemandCompliance the far field is known only where a tip has come: `step` and `follow` find what
+    is missing, solve it, and go the same ticks again. A kernel that is run by itself needs `condensed()`.
+    """
 
     name = NAME
     kernel = staticmethod(fem_step)
@@ -41,15 +46,16 @@ class FemRenderer(Renderer):
         model: Model,
         options: RenderOptions | None = None,
         *,
-        compliance: SurfaceCompliance | None = None,
+        compliance: SurfaceCompliance | OnDemandCompliance | None = None,
         progress: Progress = silent,
     ) -> None:
         self.model = model
         self.options = options or RenderOptions()
+        self.contact = touched_surface(model, self.options)  # seconds before minutes
         self.compliance = compliance or load_or_condense(model, progress=progress)
-        self.contact = touched_surface(model, self.options)
         touch = rendered_touch(model, self.options)
         field = far_field(model, self.contact, self.compliance)
+        self._added = field.added
         number = np.full(len(model.mesh.points), len(self.compliance.nodes))
         number[self.compliance.nodes] = np.arange(len(self.compliance.nodes))
         self._drawn = number[self.contact.nodes]
@@ -73,7 +79,52 @@ class FemRenderer(Renderer):
         )
 
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> FemState:
-        return new_fem_state(self.parameters, check_radii(radii_m, self.model), dt_s)
+        radii = check_radii(radii_m, self.model)
+        if len(radii) > 1:  # one tip moves the places of the others
+            self.condensed()
+        return new_fem_state(self.parameters, radii, dt_s)
+
+    def step(self, state: FemState, tips: np.ndarray) -> tuple[FemState, np.ndarray]:
+        return self._where_solved(state, partial(super().step, state, tips))
+
+    def follow(self, state: FemState, path: np.ndarray, steps_s: np.ndarray) -> np.ndarray:
+        return self._where_solved(state, partial(super().follow, state, path, steps_s))
+
+    def _where_solved(self, state: FemState, ticks: Callable[[], Any]) -> Any:
+        """What `ticks` gives once no tip comes to a place that is not solved; the state is put back before
+        each further try."""
+        if not isinstance(self.compliance, OnDemandCompliance):
+            return ticks()
+        while True:
+            before = [array.copy() for array in _arrays(state)]
+            result = ticks()
+            missing = int(state.unsolved[0])
+            if missing < 0:
+                return result
+            for array, value in zip(_arrays(state), before, strict=True):
+                array[:] = value
+            triangles = self.contact.arrays.triangles
+            beside = np.isin(triangles, triangles[missing]).any(axis=1)
+            self.far_at(np.unique(triangles[beside]))
+
+    def far_at(self, vertices: np.ndarray | slice) -> np.ndarray:
+        """(k, 3, 3) 1/m, the far field at vertices of the contact surface; solved where it is not yet."""
+        far = self.parameters.far
+        new = np.arange(len(far))[vertices]
+        new = new[np.isnan(far[new, 0, 0])]
+        if len(new):
+            _fill(far, self.contact, self.compliance, self._added, new)
+        return far[vertices]
+
+    def condensed(self) -> FemRenderer:
+        """This renderer with every place, and what lies between them: for several tips, and for a free
+        hand."""
+        if isinstance(self.compliance, OnDemandCompliance):
+            self.compliance = load_or_condense(self.model)
+            blocks, factor = np.array(self.compliance.blocks), np.array(self.compliance.factor)
+            self.parameters = self.parameters._replace(blocks=blocks, factor=factor)
+            self.far_at(slice(None))
+        return self
 
     def with_modulus(self, young_modulus_pa: float) -> FemRenderer:
         if not young_modulus_pa > 0:
@@ -94,6 +145,7 @@ class FemRenderer(Renderer):
 
         For an object that changes inside while it is touched. blocks: None keeps the table.
         """
+        self.condensed()
         if far.shape != self.parameters.far.shape or (
             blocks is not None and blocks.shape != self.parameters.blocks.shape
         ):
@@ -126,8 +178,21 @@ def create(name: str, model: Model, options: RenderOptions, progress: Progress =
     return FemRenderer(model, options, progress=progress)
 
 
+def create_on_demand(model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
+    """One that solves the places that a tip comes to, unless all are known: headless, for one tip."""
+    return FemRenderer(model, options, compliance=load_or_solve(model, progress))
+
+
+def _arrays(state: Any) -> list[np.ndarray]:
+    """All arrays of a state."""
+    if isinstance(state, np.ndarray):
+        return [state]
+    return [array for part in state for array in _arrays(part)]
+
+
 class FineSurface(NamedTuple):
-    """far (v, 3, 3) 1/m and curvature (v,) 1/m at the fine vertices, unit modulus, zero on the base.
+    """far (v, 3, 3) 1/m and curvature (v,) 1/m at the fine vertices, unit modulus, zero on the base; far NaN
+    where the compliance is solved on demand. added: (v, 3, 3) 1/m, what far has beside that of the table.
 
     curvatures: (v, 2) 1/m the principal ones, convex positive, the greatest first: curvature is their mean,
     and what a rim close by adds (mechanics.contact.edges).
@@ -138,6 +203,7 @@ class FineSurface(NamedTuple):
     """
 
     far: np.ndarray
+    added: np.ndarray
     curvature: np.ndarray
     curvatures: np.ndarray
     bracing: np.ndarray
@@ -145,30 +211,47 @@ class FineSurface(NamedTuple):
     parents: np.ndarray
 
 
-def far_field(model: Model, surface: ContactSurface, compliance: SurfaceCompliance) -> FineSurface:
+def far_field(
+    model: Model, surface: ContactSurface, compliance: SurfaceCompliance | OnDemandCompliance
+) -> FineSurface:
     """Evaluate the compliance at every fine vertex that may be touched.
 
     What is local is the dent's, which goes with the modulus under the tip: where that is not the global one,
     the half-space that the compliance takes off is of the wrong modulus, and the difference is given back.
     """
-    arrays, mesh = surface.arrays, model.mesh
+    arrays, mesh, nu = surface.arrays, model.mesh, model.material.poisson_ratio
     number = np.full(int(max(surface.parents.max(), compliance.nodes.max())) + 1, -1, dtype=np.int64)
     number[compliance.nodes] = np.arange(len(compliance.nodes))
     parents = np.ascontiguousarray(number[surface.parents])
     touched = np.unique(arrays.triangles[arrays.free > 0])
     points, normals = arrays.vertices[touched], arrays.normals[touched]
     far, bracing = np.zeros((len(arrays.vertices), 3, 3)), np.zeros(len(arrays.vertices))
-    missed = edge_law(mesh, points, normals, model.material.poisson_ratio)
-    far[touched], bracing[touched] = compliance.far_at(points, normals) + missed.far, missed.bracing
+    added = far.copy()
+    missed = edge_law(mesh, points, normals, nu)
+    added[touched], bracing[touched] = missed.far, missed.bracing
     softness = np.ones(len(arrays.vertices))
     softness[touched] = surface_softness(mesh, model.surface_ratio, points, model.tool.tip_radius_m)
     width = float(compliance.own_width_m[0])
     for v in touched[softness[touched] != 1]:
-        far[v] += (1 - softness[v]) * half_space_compliance(
-            arrays.normals[v], model.material.poisson_ratio, width
-        )
+        added[v] += (1 - softness[v]) * half_space_compliance(arrays.normals[v], nu, width)
+    if isinstance(compliance, OnDemandCompliance):
+        far[touched] = np.nan
+    else:
+        _fill(far, surface, compliance, added, touched)
     curvatures = np.zeros((len(arrays.vertices), 2))
     curvatures[touched] = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)
     curvature = curvatures.mean(axis=1)
     curvature[touched] += missed.curvature
-    return FineSurface(far, curvature, curvatures, bracing, softness, parents)
+    return FineSurface(far, added, curvature, curvatures, bracing, softness, parents)
+
+
+def _fill(
+    far: np.ndarray,
+    surface: ContactSurface,
+    compliance: SurfaceCompliance | OnDemandCompliance,
+    added: np.ndarray,
+    vertices: np.ndarray,
+) -> None:
+    """Write the far field at these vertices (k,)."""
+    points, normals = surface.arrays.vertices[vertices], surface.arrays.normals[vertices]
+    far[vertices] = compliance.far_at(points, normals) + added[vertices]

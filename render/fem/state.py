@@ -17,12 +17,12 @@ from palpate.render.surface.contact_surface import SurfaceArrays
 class FemParameters(NamedTuple):
     """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
 
-    far: (v, 3, 3) 1/m. curvature: (v,) 1/m, mean of the principal ones. bracing: (v,) 1/m (Field). softness:
-    (v,) of the material under a tip, 1 where its modulus is the global one. parents: (k, 3) compliance nodes
-    that interpolate over a triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m, or
-    of no size and factor: (n, 3, r) in their place, see SurfaceCompliance. table: dent law.
-    young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each. edition: (1,) int64,
-    that of the table.
+    far: (v, 3, 3) 1/m, NaN where it is not solved. curvature: (v,) 1/m, mean of the principal ones. bracing:
+    (v,) 1/m (Field). softness: (v,) of the material under a tip, 1 where its modulus is the global one.
+    parents: (k, 3) compliance nodes that interpolate over a triangle, -1 where fixed; parent_weights (k, 3,
+    3). blocks: (n, n, 3, 3) 1/m, or of no size and factor: (n, 3, r) in their place, see SurfaceCompliance.
+    table: dent law. young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each. edition:
+    (1,) int64, that of the table.
     """
 
     surface: SurfaceArrays
@@ -55,8 +55,9 @@ class FemState(NamedTuple):
     pairs j < i; mixed (m, 3, r) the factor at each tip; links (m, 3, 3, m) m/N, [j, c, k, i] the displacement
     of tip i's place along k for a unit force on the object at tip j along c; carried (3, m) m, by how
     much the others move each place, with the sign turned, and carried_before that of its last
-    solution; edition of the table; held (m,) int64, 1 where a tip's force did not settle in this tick. The
-    others are scratch.
+    solution; edition of the table; held (m,) int64, 1 where a tip's force did not settle in this tick;
+    unsolved (1,) int64, the first triangle that a tip came to where the far field is not solved, or -1: no
+    force is right from then on. The others are scratch.
     """
 
     forces: np.ndarray
@@ -92,6 +93,7 @@ class FemState(NamedTuple):
     bend: np.ndarray
     young: np.ndarray
     held: np.ndarray
+    unsolved: np.ndarray
     base: np.ndarray
     base_triangle: np.ndarray
     base_force: np.ndarray
@@ -130,6 +132,7 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         bend=np.zeros(m),
         young=np.zeros(m),
         held=np.zeros(m, dtype=np.int64),
+        unsolved=np.full(1, -1, dtype=np.int64),
         base=np.zeros((4, 3)),
         base_triangle=np.zeros(1, dtype=np.int64),
         base_force=np.zeros(3),

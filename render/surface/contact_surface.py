@@ -9,7 +9,8 @@ that no force steps. Everything here is made once; the 1 kHz side reads flat arr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +63,21 @@ class ContactSurface:
     node_weights: np.ndarray
     parents: np.ndarray
     parent_weights: np.ndarray
+
+    def flat(self) -> dict[str, np.ndarray]:
+        """All its arrays by name, for a file."""
+        given = self.arrays._asdict()
+        tree = given.pop("bvh")._asdict()
+        own = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "arrays"}
+        return {**given, **{f"bvh_{name}": array for name, array in tree.items()}, **own}
+
+    @classmethod
+    def from_flat(cls, flat: Mapping[str, np.ndarray]) -> ContactSurface:
+        """The inverse of `flat`; the arrays are copied, since the kernels know only writable ones."""
+        copies = {name: np.array(array) for name, array in flat.items()}
+        bvh = Bvh(**{name: copies.pop(f"bvh_{name}") for name in Bvh._fields})
+        arrays = SurfaceArrays(bvh=bvh, **{n: copies.pop(n) for n in SurfaceArrays._fields if n != "bvh"})
+        return cls(arrays, **copies)
 
     @property
     def edge_m(self) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
+from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.disk.store import content_key
@@ -101,10 +102,13 @@ def _from_touches(model: Model, surface: FeltSurface, sites: TouchSites) -> np.n
 def with_own_stiffness(renderer: Renderer) -> FeltSurface:
     """The felt surface of the renderer's model, its own stiffness computed where the folder has none.
 
-    Only a finite-element renderer tells a place's own stiffness; others leave the surface as it is.
+    Only a finite-element renderer that knows all places tells a place's own stiffness; others leave the
+    surface as it is.
     """
     surface = felt_surface(renderer.model)
     if not isinstance(renderer, FemRenderer) or surface.stiffness_from == PRESSES:
+        return surface
+    if isinstance(renderer.compliance, OnDemandCompliance):
         return surface
     plain = RenderOptions()
     if replace(renderer.options, friction=plain.friction) != plain:

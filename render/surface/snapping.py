@@ -15,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import cKDTree
 
+from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.law_errors import FirstTouch
 from palpate.mechanics.model.model import Model
 from palpate.render.options import RenderOptions
@@ -36,14 +37,34 @@ LARGEST_M = 4e-3  # a palpation further off than this is no witness of the surfa
 
 def touched_surface(model: Model, options: RenderOptions) -> ContactSurface:
     """The model's contact surface: its shape where that is known; else the mesh's, through its palpations'
-    first touches where the options ask for it. Made once for the last model: all its renderers share it."""
+    first touches where the options ask for it. Kept in the model's folder, keyed by content; the last one in
+    memory too, where all renderers of a model share it."""
     return _touched_surface(model, options.surface_edge_m, options.snap_to_touches)
 
 
 @lru_cache(maxsize=1)
 def _touched_surface(model: Model, edge_m: float, snap: bool) -> ContactSurface:
+    drawn = snap and model.mesh.shape is None and len(model.presses) > 0
+    if model.path is None:
+        return _made(model, edge_m, drawn)
+    mesh = model.mesh
+    key = content_key(
+        "contact surface 1",
+        mesh.points,
+        mesh.tetrahedra,
+        mesh.fixed,
+        mesh.touchable,
+        "" if mesh.shape is None else mesh.shape.key,
+        float(edge_m),
+        *([model.presses.point, model.presses.normal, float(model.tool.tip_radius_m)] if drawn else []),
+    )
+    path = model.path / f"contact-{key[:16]}.bin"
+    return ContactSurface.from_flat(load_or_build(path, key, lambda: _made(model, edge_m, drawn).flat()))
+
+
+def _made(model: Model, edge_m: float, drawn: bool) -> ContactSurface:
     surface = contact_surface(model.mesh, edge_m=edge_m)
-    if model.mesh.shape is not None or not snap or not len(model.presses):
+    if not drawn:
         return surface
     feet, normals, gaps = touch_gaps(surface.arrays, model)
     if not len(gaps):

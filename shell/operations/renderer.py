@@ -36,15 +36,21 @@ def renderer(
     tips (m, 3) m are the tips' centres, forces (m, 3) N act on the tool; device frame. The model's compliance
     is computed, some seconds, or read from its folder. Raises OptionError.
     """
-    make = touched_scene(model, name, render, SupportOptions())
+    make = touched_scene(model, name, render, SupportOptions(), on_demand=False)
     with call.progress("renderer") as show_progress:
         return make(show_progress).renderer
 
 
 def touched_scene(
-    model: Any, name: str, given: Mapping[str, Any], support: SupportOptions
+    model: Any,
+    name: str,
+    given: Mapping[str, Any],
+    support: SupportOptions,
+    *,
+    on_demand: bool = True,
 ) -> Callable[[Progress], TouchScene]:
-    """What will make the renderer, on its model's support; its options are looked at at once."""
+    """What will make the renderer, on its model's support; its options are looked at at once. on_demand: see
+    render.registry.create."""
     from palpate.render.base import Renderer
     from palpate.render.scene import scene_of
     from palpate.render.surface.felt_surface import with_own_stiffness
@@ -60,8 +66,8 @@ def touched_scene(
     chosen = _with_scene(model, RenderOptions(**given))
 
     def make(show_progress: Progress) -> TouchScene:
-        made = create(name, load(model, progress=show_progress), chosen, show_progress)
-        if made.model.path is not None:
+        made = create(name, load(model, progress=show_progress), chosen, show_progress, on_demand=on_demand)
+        if not on_demand and made.model.path is not None:
             with_own_stiffness(made)
         return scene_of(made, support)
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import palpate as pp
 from palpate.cli import main
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.model.files import read_model, write_model
@@ -131,10 +132,34 @@ def test_before_that_the_touch_sites_tell_it(folder):
 
 
 @pytest.mark.slow
-def test_a_press_by_the_command_leaves_the_stiffness_in_the_folder(tmp_path):
+def test_a_renderer_for_any_hand_leaves_the_stiffness_in_the_folder_and_one_press_does_not(tmp_path):
     plain = shapes.model(shapes.block((0.05, 0.05, 0.025), (3, 3, 2)), presses=no_presses(0.005))
     path = write_model(tmp_path / "plain", plain)
     words = ["--at", "0,0,0.025", "--direction", "0,0,-1", "--depth", "0.001", "--json", str(tmp_path / "j")]
     assert main(["press", str(path), *words]) == 0
     assert json.loads((tmp_path / "j").read_text())["peak_force_n"] > 0
+    assert felt_surface(read_model(path)).stiffness_from == ""
+    pp.renderer(path)
     assert felt_surface(read_model(path)).stiffness_from == PRESSES
+
+
+def test_the_contact_surface_is_kept_and_read_as_it_was_made(folder, monkeypatch):
+    """In another process as good as never made; of other touches or a damaged file it is made anew."""
+    from palpate.render.surface import snapping
+
+    first = touched_surface(folder, RenderOptions())
+    (file,) = folder.path.glob("contact-*.bin")
+
+    def again():
+        return touched_surface(read_model(folder.path), RenderOptions()).flat()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(snapping, "contact_surface", None)  # it would be called
+        read = again()
+    assert read.keys() == first.flat().keys()
+    assert all(np.array_equal(read[name], array) for name, array in first.flat().items())
+    assert all(array.flags.writeable for array in read.values())  # the kernels know no others
+    file.write_bytes(file.read_bytes()[:-9])
+    assert np.array_equal(again()["vertices"], first.arrays.vertices)
+    bare = touched_surface(folder.replaced(presses=no_presses(0.005)), RenderOptions())
+    assert bare.arrays.vertices[:, 2].max() == pytest.approx(0.05)

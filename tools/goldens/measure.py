@@ -51,7 +51,7 @@ class Measured:
         self.plain = Plain({**self.places, str(shipped.parents[1]): "CACHE"}, self.version)
         self.ask("inputs", "inputs")
         made = self.model or shipped
-        computed = shutil.ignore_patterns("compliance-*", "*.cache")
+        computed = shutil.ignore_patterns("compliance-*", "places-*", "contact-*", "*.cache")
         shutil.copytree(made, self.folder / "bare", ignore=computed)
         shutil.copytree(made, self.folder / "model")
 
