@@ -98,8 +98,14 @@ def own_compliance(solver: Solver, average: sp.csr_matrix) -> np.ndarray:
     A lone patch is solved twice: among others its last bit would be another.
     """
     k = average.shape[0]
-    loads = unit_loads(sp.vstack([average, average], format="csr") if k == 1 else average)
-    return solver.quadratic_forms(loads.reshape(-1, *loads.shape[2:])[solver.free])[:k]
+    weights = (sp.vstack([average, average]) if k == 1 else average).tocoo()
+    row = np.full(3 * len(solver.mesh.points), -1)
+    row[solver.free] = np.arange(len(solver.free))
+    loads = np.zeros((len(solver.free), 3 * weights.shape[0]), order="F")
+    for axis in range(3):
+        at = row[3 * weights.col + axis]
+        loads[at[at >= 0], 3 * weights.row[at >= 0] + axis] = weights.data[at >= 0]
+    return solver.quadratic_forms(loads.T.reshape(-1, 3, len(loads)).transpose(2, 0, 1))[:k]
 
 
 def own_blocks(

@@ -12,6 +12,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
 
 from palpate.mechanics.compliance.compression import unit_loads
 from palpate.mechanics.compliance.fine_corners import (
@@ -98,7 +99,7 @@ class OnDemandCompliance:
         return EdgeMiddles(self.own_points, self.own_triangles)
 
     @cached_property
-    def _between(self):  # type: ignore[no-untyped-def]
+    def _between(self) -> tuple[Solver, sp.csr_matrix]:
         """The mesh's own solver and the patches (t, n) of its corners."""
         solver = self._make_coarse()
         sampler = PatchSampler(solver.mesh, patch_width(solver.mesh))

@@ -112,14 +112,14 @@ class Pardiso:
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solutions for right-hand sides (n,) or (n, r)."""
         right = np.asfortranarray(right, dtype=np.float64)
-        solution = np.zeros_like(right, order="F")
+        solution = np.empty_like(right, order="F")
         self._call(33, right, solution, 1 if right.ndim == 1 else right.shape[1])
         return solution
 
     def half_solve(self, right: np.ndarray) -> np.ndarray:
         """L^-1 P b for right-hand sides (n, r), A = P' L L' P: b' A^-1 c is the product of two halves."""
         right = np.asfortranarray(right, dtype=np.float64)
-        half = np.zeros_like(right, order="F")
+        half = np.empty_like(right, order="F")
         self._call(331, right, half, right.shape[1])
         return half
 

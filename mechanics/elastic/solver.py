@@ -85,7 +85,7 @@ class Solver:
         Half the cost of solving, where the factor is Pardiso's.
         """
         f, r, c = right.shape
-        flat = np.asfortranarray(right.reshape(f, r * c))
+        flat = right.transpose(1, 2, 0).reshape(r * c, f).T  # without a copy where it is in this order
         if self.backend == "pardiso":
             half = self._factor.half_solve(flat).reshape(f, r, c)
             return np.einsum("fri,frj->rij", half, half, optimize=True)

@@ -129,6 +129,8 @@ class TrueShape:
             rows = slice(start, start + step)
             p, n = points[rows], normals[rows]
             pairs = cKDTree(p).sparse_distance_matrix(tree, reach, output_type="ndarray")
+            # in one order, whichever places are asked for together
+            pairs = pairs[np.lexsort((pairs["j"], pairs["i"]))]
             i, j = pairs["i"], pairs["j"]
             weight = area[j] * np.exp(-((pairs["v"] / width_m) ** 2) / 2)
             weight *= np.einsum("kx,kx->k", n[i], facing[j]) > _SAME_SIDE

@@ -5,27 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from palpate.mechanics.compliance.near_field import surface_softness
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
-from palpate.mechanics.compliance.patch import half_space_compliance
-from palpate.mechanics.compliance.sites import principal_curvatures
 from palpate.mechanics.compliance.stored_compliance import load_or_condense, load_or_solve
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
-from palpate.mechanics.contact.edges import edge_law
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
 from palpate.render.base import Renderer, check_radii
 from palpate.render.effects import effect_arrays, rendered_touch
+from palpate.render.fem.fine_surface import FineSurface
 from palpate.render.fem.kernel import fem_step
 from palpate.render.fem.state import FemParameters, FemState, new_fem_state
 from palpate.render.options import RenderOptions
 from palpate.render.surface.bvh import STACK, closest_triangle
-from palpate.render.surface.contact_surface import ContactSurface
 from palpate.render.surface.snapping import touched_surface
 
 NAME = "fem"
@@ -54,8 +50,7 @@ class FemRenderer(Renderer):
         self.contact = touched_surface(model, self.options)  # seconds before minutes
         self.compliance = compliance or load_or_condense(model, progress=progress)
         touch = rendered_touch(model, self.options)
-        field = far_field(model, self.contact, self.compliance)
-        self._added = field.added
+        self._fine = field = FineSurface(model, self.contact, self.compliance)
         number = np.full(len(model.mesh.points), len(self.compliance.nodes))
         number[self.compliance.nodes] = np.arange(len(self.compliance.nodes))
         self._drawn = number[self.contact.nodes]
@@ -109,12 +104,8 @@ class FemRenderer(Renderer):
 
     def far_at(self, vertices: np.ndarray | slice) -> np.ndarray:
         """(k, 3, 3) 1/m, the far field at vertices of the contact surface; solved where it is not yet."""
-        far = self.parameters.far
-        new = np.arange(len(far))[vertices]
-        new = new[np.isnan(far[new, 0, 0])]
-        if len(new):
-            _fill(far, self.contact, self.compliance, self._added, new)
-        return far[vertices]
+        self._fine.solve(self.compliance, np.arange(len(self._fine.far))[vertices])
+        return self.parameters.far[vertices]
 
     def condensed(self) -> FemRenderer:
         """This renderer with every place, and what lies between them: for several tips, and for a free
@@ -188,70 +179,3 @@ def _arrays(state: Any) -> list[np.ndarray]:
     if isinstance(state, np.ndarray):
         return [state]
     return [array for part in state for array in _arrays(part)]
-
-
-class FineSurface(NamedTuple):
-    """far (v, 3, 3) 1/m and curvature (v,) 1/m at the fine vertices, unit modulus, zero on the base; far NaN
-    where the compliance is solved on demand. added: (v, 3, 3) 1/m, what far has beside that of the table.
-
-    curvatures: (v, 2) 1/m the principal ones, convex positive, the greatest first: curvature is their mean,
-    and what a rim close by adds (mechanics.contact.edges).
-
-    bracing: (v,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges).
-    softness: (v,) of the material under a tip, global modulus over its own.
-    parents: (k, 3) numbers of each fine triangle's mesh corners among the compliance's, -1 on the base.
-    """
-
-    far: np.ndarray
-    added: np.ndarray
-    curvature: np.ndarray
-    curvatures: np.ndarray
-    bracing: np.ndarray
-    softness: np.ndarray
-    parents: np.ndarray
-
-
-def far_field(
-    model: Model, surface: ContactSurface, compliance: SurfaceCompliance | OnDemandCompliance
-) -> FineSurface:
-    """Evaluate the compliance at every fine vertex that may be touched.
-
-    What is local is the dent's, which goes with the modulus under the tip: where that is not the global one,
-    the half-space that the compliance takes off is of the wrong modulus, and the difference is given back.
-    """
-    arrays, mesh, nu = surface.arrays, model.mesh, model.material.poisson_ratio
-    number = np.full(int(max(surface.parents.max(), compliance.nodes.max())) + 1, -1, dtype=np.int64)
-    number[compliance.nodes] = np.arange(len(compliance.nodes))
-    parents = np.ascontiguousarray(number[surface.parents])
-    touched = np.unique(arrays.triangles[arrays.free > 0])
-    points, normals = arrays.vertices[touched], arrays.normals[touched]
-    far, bracing = np.zeros((len(arrays.vertices), 3, 3)), np.zeros(len(arrays.vertices))
-    added = far.copy()
-    missed = edge_law(mesh, points, normals, nu)
-    added[touched], bracing[touched] = missed.far, missed.bracing
-    softness = np.ones(len(arrays.vertices))
-    softness[touched] = surface_softness(mesh, model.surface_ratio, points, model.tool.tip_radius_m)
-    width = float(compliance.own_width_m[0])
-    for v in touched[softness[touched] != 1]:
-        added[v] += (1 - softness[v]) * half_space_compliance(arrays.normals[v], nu, width)
-    if isinstance(compliance, OnDemandCompliance):
-        far[touched] = np.nan
-    else:
-        _fill(far, surface, compliance, added, touched)
-    curvatures = np.zeros((len(arrays.vertices), 2))
-    curvatures[touched] = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)
-    curvature = curvatures.mean(axis=1)
-    curvature[touched] += missed.curvature
-    return FineSurface(far, added, curvature, curvatures, bracing, softness, parents)
-
-
-def _fill(
-    far: np.ndarray,
-    surface: ContactSurface,
-    compliance: SurfaceCompliance | OnDemandCompliance,
-    added: np.ndarray,
-    vertices: np.ndarray,
-) -> None:
-    """Write the far field at these vertices (k,)."""
-    points, normals = surface.arrays.vertices[vertices], surface.arrays.normals[vertices]
-    far[vertices] = compliance.far_at(points, normals) + added[vertices]

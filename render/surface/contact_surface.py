@@ -26,6 +26,7 @@ from palpate.render.surface.shaped import (
     EASED_AGREEMENT,
     EDGE_ROUNDING_M,
     NORMAL_SMOOTHING_M,
+    Feet,
     halved_where_bent,
     on_shape,
 )
@@ -113,11 +114,12 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     parents = np.repeat(corners, len(cells), axis=0)
     parent_weights = np.tile(barycentric[cells], (len(corners), 1, 1))
     if shape is not None:
+        feet = Feet(shape)
         vertices, triangles, within, parent_weights = halved_where_bent(
-            shape, vertices, triangles, free, parent_weights, largest
+            feet, vertices, triangles, free, parent_weights, largest
         )
         free, parents = free[within], parents[within]
-        placed = on_shape(shape, vertices, triangles, free, parent_weights)
+        placed = on_shape(feet, vertices, triangles, free, parent_weights)
         vertices, triangles, parent_weights = placed.vertices, placed.triangles, placed.weights
         free, parents = free[placed.within], parents[placed.within]
     across = neighbours(triangles)

@@ -40,8 +40,29 @@ _ALIKE = 0.8
 _MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
 
 
+class Feet:
+    """Vertices on a shape, each looked for once while more are added behind them."""
+
+    def __init__(self, shape: TrueShape) -> None:
+        self.shape = shape
+        self._placed, self._normals = np.zeros((0, 3)), np.zeros((0, 3))
+        self._known = np.zeros(0, dtype=bool)
+
+    def __call__(self, vertices: np.ndarray, used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(v, 3) m vertices of which those `used` (k,) are put onto the shape, and (v, 3) normals there, zero
+        elsewhere."""
+        more = len(vertices) - len(self._known)
+        self._placed = np.vstack([self._placed, vertices[len(vertices) - more :]])
+        self._normals = np.vstack([self._normals, np.zeros((more, 3))])
+        self._known = np.concatenate([self._known, np.zeros(more, dtype=bool)])
+        new = used[~self._known[used]]
+        self._placed[new], self._normals[new] = self.shape.foot(vertices[new])
+        self._known[new] = True
+        return self._placed.copy(), self._normals.copy()
+
+
 def halved_where_bent(
-    shape: TrueShape,
+    feet: Feet,
     vertices: np.ndarray,
     triangles: np.ndarray,
     free: np.ndarray,
@@ -54,16 +75,21 @@ def halved_where_bent(
     what interpolates over the triangles. At most `largest` triangles. Edges over creases stay.
     """
     within = np.arange(len(triangles))
+    known, gaps = np.zeros(0, dtype=np.int64), np.zeros(0)
     for _ in range(_HALVINGS):
         touch = triangles[free[within] > 0]
         ends = np.sort(np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
         ends = np.unique(ends, axis=0)
-        used = np.unique(touch)
-        placed, normals = vertices.copy(), np.zeros_like(vertices)
-        placed[used], normals[used] = shape.foot(vertices[used])
+        placed, normals = feet(vertices, np.unique(touch))
         bent = np.linalg.norm(normals[ends[:, 0]] - normals[ends[:, 1]], axis=1)
         ends = ends[(bent > 1e-6) & (np.einsum("kx,kx->k", *normals[ends.T]) > _CROSSES)]
-        gap = np.abs(shape.distance(placed[ends].mean(axis=1)))
+        # most edges were there before
+        keys = (ends[:, 0] << 32) + ends[:, 1]
+        new = ~np.isin(keys, known)
+        known = np.concatenate([known, keys[new]])
+        gaps = np.concatenate([gaps, np.abs(feet.shape.distance(placed[ends[new]].mean(axis=1)))])
+        order = np.argsort(known)
+        gap = gaps[order[np.searchsorted(known, keys, sorter=order)]]
         room = max(0, largest - len(triangles)) // 2  # an edge more makes two triangles more
         chosen = np.argsort(-gap)[:room]
         ends = ends[chosen[gap[chosen] > SAG_M]]
@@ -86,17 +112,17 @@ class OnShape(NamedTuple):
 
 
 def on_shape(
-    shape: TrueShape, vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray, weights: np.ndarray
+    feet: Feet, vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray, weights: np.ndarray
 ) -> OnShape:
     """Put a contact surface onto the shape: its vertices (v, 3) m and triangles (k, 3), cut beside rims.
 
     free: (k,) 1 where they may be touched; the base's inner vertices stay.
     """
-    touch = triangles[free > 0]
+    touch, shape = triangles[free > 0], feet.shape
     used = np.unique(touch)
-    placed, normals = vertices.copy(), np.zeros_like(vertices)
-    normals[np.unique(triangles[free == 0])] = _mean_normal(vertices, triangles[free == 0])
-    placed[used], normals[used] = shape.foot(vertices[used])
+    placed, normals = feet(vertices, used)
+    inner = np.setdiff1d(triangles[free == 0], used)
+    normals[inner] = _mean_normal(vertices, triangles[free == 0])
     rim = np.intersect1d(used, triangles[free == 0])
     edge = float(np.median(np.linalg.norm(vertices[touch[:, 0]] - vertices[touch[:, 1]], axis=1)))
     creased = _on_creases(shape, placed, normals, touch, rim, edge)
