@@ -69,7 +69,7 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
     leave to the modulus is made good here, by the median over presses: one drag that the model misses must
     not decide. recording: read right (`corrected`). Where the replay gives no force the model stays.
     """
-    from palpate.render.fem.renderer import FemRenderer
+    from palpate.render.registry import create
     from palpate.render.replay import replay_recording
 
     counted = model.presses.touching(recording.t)
@@ -77,7 +77,7 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
     if not len(begins):
         return model
     measured = recording.force_on_tool
-    renderer, modulus = FemRenderer(model), model.material.young_modulus_pa
+    renderer, modulus = create("fem", model, on_demand=True), model.material.young_modulus_pa
     for _ in range(REPLAYS):
         forces = np.where(counted[:, None], replay_recording(renderer, recording), 0.0)
         meets = np.add.reduceat((forces * measured).sum(axis=1), begins)
@@ -126,10 +126,11 @@ def improvement(model: Model, diagnosis: Verdict, recording: Recording) -> Impro
 
 def replayed_gap_n(model: Model, recording: Recording) -> float:
     """N rms of measured less rendered force while pressing; nan where the recording has no press."""
-    from palpate.render.fem.renderer import FemRenderer
+    from palpate.render.registry import create
     from palpate.render.replay import replay_error, replay_recording
 
-    return replay_error(recording, model.presses, replay_recording(FemRenderer(model), recording)).rmse_n
+    forces = replay_recording(create("fem", model, on_demand=True), recording)
+    return replay_error(recording, model.presses, forces).rmse_n
 
 
 def with_effects(model: Model, named: Mapping[str, Mapping[str, Any]]) -> Model:

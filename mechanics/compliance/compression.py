@@ -109,10 +109,18 @@ def own_compliance(solver: Solver, average: sp.csr_matrix) -> np.ndarray:
 
 
 def own_blocks(
-    solver: Solver, points: np.ndarray, width: float, tell: Callable[[float], None] = lambda share: None
+    solver: Solver,
+    points: np.ndarray,
+    width: float,
+    tell: Callable[[float], None] = lambda share: None,
+    *,
+    sampler: PatchSampler | None = None,
 ) -> np.ndarray:
-    """(t, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; surface points (t, 3)."""
-    average = PatchSampler(solver.mesh, width).matrix(points)
+    """(t, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; surface points (t, 3).
+
+    sampler: of the solver's mesh and that width, where there is one.
+    """
+    average = (sampler or PatchSampler(solver.mesh, width)).matrix(points)
     own = np.empty((len(points), 3, 3))
     for start in range(0, len(points), _AT_ONCE):
         part = slice(start, min(start + _AT_ONCE, len(points)))

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
 from palpate.mechanics.compliance.compression import own_blocks
 from palpate.mechanics.compliance.near_field import sharpening
-from palpate.mechanics.compliance.patch import half_space_compliance, triangle_shapes
+from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance, triangle_shapes
 from palpate.mechanics.compliance.sites import (
     SURFACE_EDGE_M,
     load_width,
@@ -54,8 +55,9 @@ class FineCorners:
         """(k, 3, 3) 1/m: displacement of the patch at each of these corners for a unit force on itself, unit
         modulus. Where a part of the base is loose, the numbers hang on which are solved together."""
         points, normals, width = self.points[corners], self.normals[corners], self.width_m
+        each = "compliance of each place"
         own = own_blocks(
-            self.solver, points, width, lambda f: progress("compliance of each place", 0.3 + 0.5 * f)
+            self.solver, points, width, lambda f: progress(each, 0.3 + 0.5 * f), sampler=self._sampler
         )
         own += shape_under_one_patch(self.solver, points, normals, width)
         if self.balls:  # what covers the whole surface is in the dent: its law, and the modulus under the tip
@@ -65,6 +67,10 @@ class FineCorners:
         if self.loose:
             own -= carried_by_floor(self.solver, points, normals, width)
         return own
+
+    @cached_property
+    def _sampler(self) -> PatchSampler:
+        return PatchSampler(self.solver.mesh, self.width_m)
 
 
 def fine_corners(

@@ -47,8 +47,7 @@ def settle(p, state, i):
         bracing += weights[corner] * p.bracing[v]
         softness += weights[corner] * p.softness[v]
         if np.isnan(p.far[v, 0, 0]):
-            if state.unsolved[0] < 0:
-                state.unsolved[0] = t
+            state.unsolved[v] = 1
             continue
         for r in range(3):
             for c in range(3):

@@ -93,14 +93,12 @@ class FemRenderer(Renderer):
         while True:
             before = [array.copy() for array in _arrays(state)]
             result = ticks()
-            missing = int(state.unsolved[0])
-            if missing < 0:
+            missing = np.flatnonzero(state.unsolved)
+            if not len(missing):
                 return result
             for array, value in zip(_arrays(state), before, strict=True):
                 array[:] = value
-            triangles = self.contact.arrays.triangles
-            beside = np.isin(triangles, triangles[missing]).any(axis=1)
-            self.far_at(np.unique(triangles[beside]))
+            self.far_at(missing)
 
     def far_at(self, vertices: np.ndarray | slice) -> np.ndarray:
         """(k, 3, 3) 1/m, the far field at vertices of the contact surface; solved where it is not yet."""

@@ -56,8 +56,8 @@ class FemState(NamedTuple):
     of tip i's place along k for a unit force on the object at tip j along c; carried (3, m) m, by how
     much the others move each place, with the sign turned, and carried_before that of its last
     solution; edition of the table; held (m,) int64, 1 where a tip's force did not settle in this tick;
-    unsolved (1,) int64, the first triangle that a tip came to where the far field is not solved, or -1: no
-    force is right from then on. The others are scratch.
+    unsolved (v,) int8, 1 where the far field of a fine vertex was wanted that is not solved: it was taken for
+    zero, and no force is right from then on. The others are scratch.
     """
 
     forces: np.ndarray
@@ -132,7 +132,7 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         bend=np.zeros(m),
         young=np.zeros(m),
         held=np.zeros(m, dtype=np.int64),
-        unsolved=np.full(1, -1, dtype=np.int64),
+        unsolved=np.zeros(len(parameters.surface.vertices), dtype=np.int8),
         base=np.zeros((4, 3)),
         base_triangle=np.zeros(1, dtype=np.int64),
         base_force=np.zeros(3),
