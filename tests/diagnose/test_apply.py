@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import palpate.mechanics.compliance.surface_compliance as made
+import palpate.mechanics.compliance.fine_corners as made
 from palpate.diagnosis.apply import improvement, with_effects, with_replayed_modulus
 from palpate.mechanics.compliance.near_field import sharpening, surface_softness
 from palpate.mechanics.compliance.pressed_places import solve_places

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-import palpate.mechanics.compliance.surface_compliance as made
+import palpate.mechanics.compliance.fine_corners as made
 from palpate.diagnosis.apply import with_effects
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
