@@ -9,13 +9,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from benchmarks._known_shapes import KnownShape
-from benchmarks.felt_surface import NU, TIP_M, own_compliance_near, standing, straight_in
+from benchmarks.felt_surface import NU, TIP_M, standing, straight_in
 from palpate.mechanics.disk.writing import atomic_file
 from palpate.mechanics.errors import PalpateError
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.force_error import place_numbers
 from palpate.render.options import RenderOptions
+from palpate.render.registry import create
 from palpate.scenes.laboratory.mesh import laboratory_cache
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
 from palpate.scenes.laboratory.surface import Surface
@@ -79,9 +80,9 @@ def rendered(
     friction: None sticks. bent: the dent knows of the surface's curvature, else its effective radius alone.
     """
     model = standing(mesh, poisson_ratio, dent_law="neo-hookean")
-    compliance = own_compliance_near(mesh, points, poisson_ratio)
     options = RenderOptions(friction=np.inf if friction is None else friction)
-    renderer = FemRenderer(model, options, compliance=compliance)
+    renderer = create("fem", model, options, on_demand=True)
+    assert isinstance(renderer, FemRenderer)
     if not bent:
         renderer.parameters.table[:, 3] = 0.0
     near = cKDTree(renderer.contact.arrays.vertices).query(points)[1]

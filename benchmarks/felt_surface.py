@@ -13,25 +13,22 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from benchmarks._known_shapes import SHAPES, KnownShape
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from palpate.mechanics.compliance.compression import own_blocks
-from palpate.mechanics.compliance.sites import patch_width, touch_solver
-from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.flat_foot import Standing
 from palpate.mechanics.shape.nearest import sample
-from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
+from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.output import progress_bar
 from palpate.reconstruction.shapes.drawing import decimated
 from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, fill
-from palpate.render.fem.renderer import FemRenderer
+from palpate.render.base import Renderer
+from palpate.render.registry import create
 from palpate.render.surface.contact_surface import contact_surface
 
 TIP_M, MODULUS_PA, NU = 0.005, 20e3, 0.49
@@ -40,7 +37,6 @@ REACHED_M = 0.003
 """Height over the support from which a tip can touch."""
 RIM_M = 0.008
 """Within this of a sharp edge a place counts as at a rim."""
-_AROUND_M = 0.012
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -105,7 +101,7 @@ def measured(
 
 def forces(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(places, depths) N along the normal, straight presses from outside to each depth below the points."""
-    renderer = FemRenderer(standing(mesh), compliance=own_compliance_near(mesh, points))
+    renderer = create("fem", standing(mesh), on_demand=True)
     return straight_in(renderer, points, normals, np.array(DEPTHS_M))
 
 
@@ -118,7 +114,7 @@ def standing(mesh: TetMesh, nu: float = NU, dent_law: str = "linear") -> Model:
 
 
 def straight_in(
-    renderer: FemRenderer, points: np.ndarray, normals: np.ndarray, depths_m: np.ndarray
+    renderer: Renderer, points: np.ndarray, normals: np.ndarray, depths_m: np.ndarray
 ) -> np.ndarray:
     """(places, depths) N along the normal as rendered, the tip coming from outside."""
     way = np.linspace(-0.002, depths_m[-1], 101)
@@ -128,31 +124,6 @@ def straight_in(
         force = renderer.follow(renderer.start([TIP_M]), path[:, None], np.full(len(way), 10.0))[:, 0]
         row[:] = np.interp(depths_m, way, force @ normal)
     return result
-
-
-def own_compliance_near(mesh: TetMesh, points: np.ndarray, nu: float = NU) -> SurfaceCompliance:
-    """What `surface_compliance` makes, of places near the points alone, and nothing between places."""
-    fine = touch_solver(mesh, nu)
-    width = patch_width(fine.mesh)
-    nodes, triangles = _corners(fine.mesh)
-    corners = fine.mesh.points[nodes]
-    near = np.flatnonzero(cKDTree(points).query(corners)[0] < _AROUND_M)
-    own = np.zeros((len(corners), 3, 3))
-    own[near] = own_blocks(fine, corners[near], width)
-    linear, facing = mesh.linear(), vertex_normals(fine.mesh.points, fine.mesh.surface[:, :3])[nodes]
-    coarse, faces = _corners(linear)
-    return SurfaceCompliance(
-        nodes=coarse, points=linear.points[coarse],
-        normals=vertex_normals(linear.points, linear.surface)[coarse], triangles=faces,
-        blocks=np.zeros((0, 0, 3, 3), dtype=np.float32), patch_width_m=np.array([width]),
-        factor=np.zeros((len(coarse), 3, 1), dtype=np.float32), own_points=corners, own_normals=facing,
-        own_triangles=triangles, own=own, own_width_m=np.array([width]), poisson_ratio=np.array([nu]),
-    )  # fmt: skip
-
-
-def _corners(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:
-    nodes, local = np.unique(mesh.touchable_surface[:, :3], return_inverse=True)
-    return nodes, local.reshape(-1, 3)
 
 
 def report(

@@ -10,6 +10,7 @@ from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import principal_curvatures
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.errors import MeshError
 from palpate.mechanics.model.model import Model
 from palpate.render.surface.contact_surface import ContactSurface
 
@@ -65,4 +66,7 @@ class FineSurface:
         if model.mesh.shape is not None:
             bent = principal_curvatures(model.mesh, points, normals, model.tool.tip_radius_m).mean(axis=1)
             self.curvature[new] = bent + self._rims[new]
-        self.far[new] = compliance.far_at(points, normals) + self._added[new]
+        far = compliance.far_at(points, normals) + self._added[new]
+        if not np.isfinite(far).all():
+            raise MeshError("the compliance is not known all over the surface: solve it anew")
+        self.far[new] = far
