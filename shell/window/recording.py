@@ -13,7 +13,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import write_recording
 from palpate.servo import Servo
 from palpate.servo.recorder import Recorder
-from palpate.window.guide import BaseTracing
+from palpate.window.base_tracing import BaseTracing
 
 MARGIN_S = 0.05
 

@@ -17,7 +17,7 @@ import pytest
 from palpate.cli import main
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import read_recording
-from palpate.window.guide import BaseTracing
+from palpate.window.base_tracing import BaseTracing
 
 from ...support.waiting import PATIENCE_S, eventually
 
