@@ -85,7 +85,16 @@ class NuisanceOptions:
 
     onset_m: float = option(FirstTouch.diagnosis.value, "error of first touch, each press", unit="m")
     site_stiffness: float = option(
-        Stiffness.diagnosis.value, "share by which a site's stiffness may be wrong (shape, mesh)"
+        Stiffness.diagnosis.value,
+        "share by which a site's stiffness may be wrong, where the law's bound is not known",
+    )
+    law_bound: float = option(
+        Stiffness.bound.value,
+        "share by which a site's stiffness may be wrong by the law, in standard deviations of its bound there",
+    )
+    surface: float = option(
+        Stiffness.surface.value,
+        "share by which a site's stiffness may be wrong, a unit of the surface's error over the height",
     )
     press_stiffness: float = option(Repeats.diagnosis.value, "share by which repeats at a site may differ")
     tilt: float = option(Direction.diagnosis.value, "error of a site's normal", unit="rad")

@@ -23,6 +23,7 @@ _EXPLORING = f"{_SET}; without errors that places share, sound silicones lose 'n
 _PLANNING = f"{_SET}; it ranks touches that are still to be made (docs/decisions/0150)"
 _SIMULATOR = f"{_SET}; names were tested on sealed flaws with it (`palpate bench simulated`)"
 _PIECES = f"{_SET}, for a machine's curves at the size of a hand (docs/decisions/0120)"
+_CONTROLS = "fitted to the presses of sound objects of the laboratory (`palpate bench places`)"
 _BOUND = "fitted to solved presses at places of known shapes (`palpate bench law-bound`)"
 
 
@@ -64,7 +65,14 @@ class FirstTouch:
 class Stiffness:
     """Share by which a place pushes back too much or too little, whatever the depth: law, mesh, shape."""
 
-    diagnosis = OwnError(0.03, "1", "stiffness of a place, where it is not solved", "place", _DIAGNOSIS)
+    diagnosis = OwnError(
+        0.03, "1", "stiffness of a place whose bound is not known: a running shape, a machine's curves",
+        "place", _DIAGNOSIS,
+    )  # fmt: skip
+    bound = OwnError(
+        1.4, "1", "stiffness of a place that is not solved, in standard deviations of the law's bound there",
+        "place", _CONTROLS,
+    )  # fmt: skip
     simulator = OwnError(
         0.03, "1", "stiffness on the surface that a simulator was given too", "place", _SIMULATOR
     )
@@ -77,8 +85,12 @@ class Stiffness:
         "together (`palpate bench press-solver --convergence`)",
     )  # fmt: skip
     surface = OwnError(
-        2.5, "1", "relative stiffness a unit of the surface's error over the object's height; edges near a "
-        "press count double", "place", _SET,
+        0.75, "1", "relative stiffness a unit of the surface's error over the object's height", "place",
+        _CONTROLS,
+    )  # fmt: skip
+    running_surface = OwnError(
+        2.5, "1", "the same of a surface that is still being explored; edges near a press count double",
+        "place", _SET,
     )  # fmt: skip
     shared_over = OwnError(
         0.03, "m", "distance over which neighbours share the stiffness of a place", "neighbours", _EXPLORING

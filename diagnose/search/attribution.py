@@ -45,7 +45,7 @@ def drop_redundant(
     others = [s.effect for s in alone.values() if s.name not in chosen and search.passes(s)]
     others.sort(key=lambda e: -alone[e.name].gain)
     own = _cost(search, current)
-    over = max(1.0, current.chi) * search.forward.touches.noise.variance_inflation
+    over = current.over
     found = []
     for tried in _sets(effects, others[:TRIED], seen):
         candidate = search.judge([*base, *tried])
@@ -308,7 +308,7 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[JudgedSet, 
     of held-out squares, N^2: a law may be far likelier where noise is small, and still predict worse."""
     rest = [e for e in effects if e is not search.finite_strain]
     without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
-    over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.noise.variance_inflation
+    over = min(without.over, deep.over)
     each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
     # the site that speaks loudest, for or against, may be one that slipped
     gain = (each.sum() - each.max() - each.min()) / over

@@ -20,13 +20,19 @@ linear answer is no place that the other groups would choose."""
 
 @dataclass(frozen=True)
 class JudgedSet:
-    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the
-    base."""
+    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and `place_chi`
+    of what it leaves (search.whiten): by so much our own errors are wider than said, if that is all."""
 
     found: Fit
     held: np.ndarray
     plain: np.ndarray
     dof: float
+    place_chi: float
+
+    @property
+    def over(self) -> float:
+        """What gains by what differs from place to place are divided by: the set's own lack of fit."""
+        return max(1.0, self.chi, self.place_chi)
 
     @property
     def residual(self) -> np.ndarray:

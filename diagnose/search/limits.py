@@ -90,7 +90,6 @@ class Patterns:
         self.white = Products.of(whitener.gram(both), shown.shape[2])
         self.plain = Products.of(whitener.raw_gram(both), shown.shape[2])
         self.counts = whitener.counts()
-        self.over = forward.touches.noise.variance_inflation
         groups = len(self.counts)
         picks = np.random.default_rng(0).integers(0, groups, (RESAMPLES, groups))
         self.weights = np.stack([np.bincount(p, minlength=groups) for p in picks]).astype(float)
@@ -140,13 +139,12 @@ class Patterns:
         extra, groups = len(effect.parameters), len(self.counts)
         old, new = white.fitted(None), white.fitted(column)
         each = 0.5 * (old.loss - new.loss)
-        predicted = (each.sum(axis=1, keepdims=True) - each) / self.over > extra
+        predicted = each.sum(axis=1, keepdims=True) - each > extra
         per_group = np.where(predicted, 0.5 * (old.held - new.held), 0.0)
         gain = per_group.sum(axis=1)
         if effect.scope.between_places:
             per_group = each
             gain = each.sum(axis=1) - 0.5 * np.log(groups) * extra
-        gain, per_group = gain / self.over, per_group / self.over
         lump = effect.hints.few_places
         evidence = gain - (np.log(groups) if lump else np.maximum(per_group.max(axis=1), 0.0))
         was = plain.left(None, old.amplitude, not lump)

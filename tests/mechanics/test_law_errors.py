@@ -46,6 +46,8 @@ def test_options_default_to_the_table():
         NuisanceOptions: {
             "onset_m": FirstTouch.diagnosis,
             "site_stiffness": Stiffness.diagnosis,
+            "law_bound": Stiffness.bound,
+            "surface": Stiffness.surface,
             "press_stiffness": Repeats.diagnosis,
             "tilt": Direction.diagnosis,
             "stick": Slip.diagnosis,
