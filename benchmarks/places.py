@@ -1,7 +1,7 @@
-"""How far places of sound objects are from the law, over what the law's bound and the surface's error say.
+"""How far places of sound objects are from the law, over what its bound and the surface's error say.
 
-Of a work folder of `palpate bench diagnose`: every control that is prepared there. Each place's stiffness over
-that of all, with its standard error by noise and repeats; the two factors that make these likeliest
+Of a work folder of `palpate bench diagnose`: every control that is prepared there. Each place's stiffness
+over that of all, with its standard error by noise and repeats; the two factors that make these likeliest
 (mechanics.law_errors.Stiffness), the modulus of each object free.
 """
 
@@ -45,10 +45,11 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     found = places_of([c.recording for c in controls], arguments.work)
     if not found:
         raise OptionError(f"{arguments.work}: no prepared control there with {LEAST_PLACES} places that tell")
-    print(table(["object", "places", "rms off", "of it noise", "bound says", "surface says"], [
-        [name, str(len(x)), *(f"{100 * v:.1f} %" for v in (x[:, 0].std(), *np.sqrt((x[:, 1:] ** 2).mean(axis=0))))]
-        for name, x in found.items()
-    ]))  # fmt: skip
+    rows = []
+    for name, x in found.items():
+        shares = (x[:, 0].std(), *np.sqrt((x[:, 1:] ** 2).mean(axis=0)))
+        rows.append([name, str(len(x)), *(f"{100 * share:.1f} %" for share in shares)])
+    print(table(["object", "places", "rms off", "of it noise", "bound", "surface"], rows))
     each = list(found.values())
     factors, rng = likeliest(each), np.random.default_rng(0)
     drawn = [likeliest([each[i] for i in rng.integers(0, len(each), len(each))]) for _ in range(RESAMPLES)]

@@ -1,7 +1,7 @@
 """What a diagnosis can be set to: how much is tried, what decides a name, how wide our own errors are.
 
-All numbers that decide a name are in `AttributionOptions`; beside them stand the weights of evidence and
-closure, fitted to cases of known truth (search/naming.toml). Widths of our own errors default to their table
+All numbers that decide a name are in `AttributionOptions`; beside them stand the weights of evidence, fitted
+to cases of known truth (search/naming.toml). Widths of our own errors default to their table
 (mechanics.law_errors).
 """
 
@@ -90,7 +90,7 @@ class NuisanceOptions:
     )
     law_bound: float = option(
         Stiffness.bound.value,
-        "share by which a site's stiffness may be wrong by the law, in standard deviations of its bound there",
+        "share by which a site's stiffness may be wrong by the law, in standard deviations of its bound",
     )
     surface: float = option(
         Stiffness.surface.value,

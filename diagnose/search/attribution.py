@@ -165,7 +165,7 @@ def attribute(
             break
         first = not chosen
         for score in list(scores.values()):
-            if score.may_be and not search.passes(score, first=first):
+            if score.probability > search.options.sure and not search.passes(score, first=first):
                 scores[score.name] = _reexamined(search, score, current)
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)

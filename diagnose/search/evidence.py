@@ -13,7 +13,7 @@ from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.descent import Descent, first_touches, fit
 from palpate.diagnosis.search.fit import Fit, settings_of
-from palpate.diagnosis.search.gaps import closed_share, lower_closure
+from palpate.diagnosis.search.gaps import closed_share
 from palpate.diagnosis.search.leave_one_out import JudgedSet, held_out
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.whiten import Whitener
@@ -117,14 +117,13 @@ class Search:
         least = self.smallest_n**2
         samples = self.whitener.counts()
         share = float(closed_share(was, left, samples, noise, least))
-        closes = lower_closure(was, left, samples, noise, least, self.options.doubt)
-        return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
+        return Score(tuple(added), float(gain / over), size, share, per_group / over, new)
 
     def passes(self, score: Score, *, first: bool = True) -> bool:
         """Whether a score names its effect. first: nothing else is named yet."""
         if score.effect.hints.by_first_touches and not first:
             return False
-        return score.closure > 0 and score.probability > self.options.sure
+        return score.share > 0 and score.probability > self.options.sure
 
     def sideways_off(self, candidate: JudgedSet) -> float:
         """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.

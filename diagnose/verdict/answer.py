@@ -150,11 +150,11 @@ def finite_strain_size(forward: Forward, found: Fit) -> float:
 
 
 def _unconfirmed_lump(findings: Findings, answer: Answer) -> None:
-    """A lump that closes something by one place alone may be a shape that is wrong there."""
+    """A lump that one place alone speaks for may be a shape that is wrong there."""
     found = findings.found
     for scores, name in zip(found.steps, found.picked, strict=False):
         lives_in_few = name in scores and scores[name].effect.hints.few_places
-        if lives_in_few and name in found.chosen and scores[name].closes <= 0:
+        if lives_in_few and name in found.chosen and scores[name].by_one_place:
             answer.candidates += _rest()
             answer.reasons.append("only one place shows the lump: the shape may be wrong there instead")
 
@@ -178,7 +178,9 @@ def _shape(findings: Findings, answer: Answer) -> None:
             answer.candidates += [
                 s.name
                 for s in ranked
-                if s.effect.hints.shape_rival and s.may_be and found.confidence_set_p[s.name] > doubt
+                if s.effect.hints.shape_rival
+                and s.probability > findings.search.options.sure
+                and found.confidence_set_p[s.name] > doubt
             ]
         answer.reasons.append(
             f"places differ in stiffness by {100 * spread:.0f} % more than the shape's uncertainty"
