@@ -335,7 +335,7 @@ def _without_idle(
         if effect.hints.slips and search.sideways_off(without):
             continue
         score = search.score([effect], current, without)
-        if not score.may_be:
+        if score.probability <= search.options.doubt:
             chosen.remove(name)
             current = without
     return current, chosen
