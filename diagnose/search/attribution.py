@@ -42,7 +42,10 @@ def drop_redundant(
     """
     effects = [e for e in current.found.effects if e.name in chosen]
     base = [e for e in current.found.effects if e.name not in chosen]
-    others = [s.effect for s in alone.values() if s.name not in chosen and search.passes(s)]
+    # what is certainly less likely by itself is not what fewer effects would be
+    least = max((alone[n].log_odds for n in chosen if n in alone), default=0.0) - search.options.beyond_doubt
+    able = (s for s in alone.values() if s.name not in chosen and search.passes(s) and s.log_odds > least)
+    others = [s.effect for s in able]
     others.sort(key=lambda e: -alone[e.name].gain)
     own = _cost(search, current)
     over = current.over
@@ -184,7 +187,7 @@ def attribute(
             search.renew(pair.found)
             current, strain_gain, strain_closes = _with_strain(search, pair.found.effects)
             break
-        best = _likeliest(passing, search.options.beyond_doubt)
+        best = max(passing, key=lambda s: s.log_odds)
         for effect in effects:
             if of_one_phenomenon(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
@@ -211,13 +214,6 @@ def attribute(
         base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps),
         taken, strain_gain, strain_closes, known_p[0],
     )  # fmt: skip
-
-
-def _likeliest(passing: Sequence[Score], beyond_doubt: float) -> Score:
-    """The score that gains most of those as likely to be there as any; a fit that does not carry over is
-    not."""
-    best = max(s.log_odds for s in passing)
-    return max((s for s in passing if s.log_odds > best - beyond_doubt), key=lambda s: s.gain)
 
 
 def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:
