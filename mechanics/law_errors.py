@@ -185,9 +185,9 @@ class Unnamed:
     """What no error above covers, drawn anew at every thinned sample."""
 
     share = OwnError(
-        0.01, "1", "force in proportion to itself", "sample",
-        "the laboratory's blind cases: with 0.5 % a sound dome stays unknown, with 1 % not; of 25 controls "
-        "2 in place of 4 are given a cause",
+        0.025, "1", "force in proportion to itself; 1 %, as it goes on along a press", "sample",
+        "at a force of 300 times the noise a sound kidney's false causes gain up to 34 nats with 1 %, 7 with "
+        "2.5 %; causes that are there lose a fifth",
     )  # fmt: skip
     share_exploring = OwnError(
         0.0, "1", "force in proportion to itself, in exploring", "sample",
