@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from benchmarks._diagnosis_cases import SEEDS, cases
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
@@ -35,14 +34,12 @@ RESAMPLES = 100
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the prepared cases are."""
     parser.add_argument("--work", type=Path, default=Path("bench-diagnose"), help="folder of prepared cases")
-    parser.add_argument("--size", default="medium", help="of the cases in it")
-    parser.add_argument("--cases", choices=tuple(SEEDS), default="calibration", help="whose seeds")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Measure every control, fit, print a row an object."""
-    controls = [c for c in cases(arguments.size, None, SEEDS[arguments.cases]) if c.kind == "control"]
-    found = places_of([c.recording for c in controls], arguments.work)
+    prepared = sorted(path.name for path in (arguments.work / "models").glob("*-none-*"))
+    found = places_of(prepared, arguments.work)
     if not found:
         raise OptionError(f"{arguments.work}: no prepared control there with {LEAST_PLACES} places that tell")
     rows = []
@@ -68,11 +65,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def places_of(names: list[str], work: Path) -> dict[str, np.ndarray]:
     """{recording: (s, 4) a place: stiffness over the law's, its standard error, one standard deviation of the
-    law's bound, the surface's error over the height}; of those that are prepared and tell."""
+    law's bound, the surface's error over the height}; of those that tell."""
     found = {}
     for name in names:
-        if not (work / "models" / name).exists():
-            continue
         recording = read_recording(work / f"{name}.toml")
         options, rules = DiagnoseOptions(), AttributionOptions()
         try:
