@@ -12,7 +12,16 @@ from dataclasses import dataclass, replace
 from scipy.special import logit
 
 from palpate.mechanics.effects.registry import known
-from palpate.mechanics.law_errors import DepthLaw, Direction, FirstTouch, Repeats, Slip, Stiffness, Unnamed
+from palpate.mechanics.law_errors import (
+    DepthLaw,
+    Direction,
+    FirstTouch,
+    Latency,
+    Repeats,
+    Slip,
+    Stiffness,
+    Unnamed,
+)
 from palpate.mechanics.options import EXACT, option
 
 
@@ -104,8 +113,14 @@ class NuisanceOptions:
     law: float = option(
         DepthLaw.diagnosis.value, "share by which a site's depth law may bend wrongly over the depth reached"
     )
+    latency_s: float = option(
+        Latency.diagnosis.value, "error of when the force is read, each press", unit="s"
+    )
     floor_share: float = option(
         Unnamed.share.value, "error of the model that no name covers, share of a sample's force"
+    )
+    floor_along: float = option(
+        Unnamed.along.value, "by how much that share's variance adds up along a press"
     )
     floor_n: float = option(
         Unnamed.force.value, "error of the model that no name covers, each thinned component", unit="N"

@@ -87,7 +87,8 @@ class Search:
         held, plain = held_out(found, descent)
         # the widths of a simulator's comparison are set by hand, so nothing is told by what exceeds them
         wide = self.whitener.place_chi(found.residual) if self.forward.measured else 1.0
-        candidate = JudgedSet(found, held, plain, self.dof, wide)
+        missed = self.whitener.misfit(found.residual)
+        candidate = JudgedSet(found, held, plain, missed, self.dof, wide)
         self._cache[key] = candidate
         return candidate
 

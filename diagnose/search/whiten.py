@@ -62,11 +62,13 @@ class Whitener:
         (p,) m, of each first touch; by default the options' and what the table states of each. slow: by how
         much more than white the noise counts (its variance), as slow noise adds up along a press."""
         self.touches = forward.touches
+        at_once = self.touches.noise_n**2 + options.floor_n**2
         self.variance = slow * self.touches.noise_n**2 + options.floor_n**2
         before = np.nan_to_num(forward.predict(settings))
-        share = options.floor_share * np.linalg.norm(before, axis=1)
+        share = np.sqrt(options.floor_along) * options.floor_share * np.linalg.norm(before, axis=1)
         bridges, self.air, unbridged = _bridges(self.touches)
         self.louder = np.sqrt(1 + (share**2 + unbridged) / self.variance)
+        self.sample_variance = at_once + share**2 / options.floor_along + unbridged
         self.blocks: list[WhitenedGroup] = []
         presses = len(self.touches)
         stated = np.hypot(options.onset_m, self.touches.onset_error_m)
@@ -77,6 +79,7 @@ class Whitener:
         if settings.unsure_m is not None:
             slope = np.linalg.norm(self.onset_column, axis=1)
             self.louder = np.sqrt(self.louder**2 + (slope * settings.unsure_m) ** 2 / self.variance)
+            self.sample_variance = self.sample_variance + (slope * settings.unsure_m) ** 2
         site = options.site_stiffness if site_sd is None else site_sd
         self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(presses)
         brought = 0.0
@@ -96,14 +99,30 @@ class Whitener:
         The place that misses most is left out: a touch there may have slipped."""
         each = []
         for block in self.blocks:
-            loud = self.louder[block.rows][:, None]
-            pulled = block.halved @ (residual[block.rows] / loud).reshape(-1) / self.variance
+            found = self._nuisances(block, residual)[block.own]
             lower = np.tril(block.factor[0])
-            found = solve_triangular(lower, pulled, lower=True, trans="T")[block.own]
             unit = np.eye(len(lower))[:, block.own]
             left = (solve_triangular(lower, unit, lower=True) ** 2).sum(axis=0)
             each.append(np.mean(found**2 / np.maximum(1 - left, _LEAST)))
         return float((np.sum(each) - np.max(each)) / max(len(each) - 1, 1))
+
+    def misfit(self, residual: np.ndarray) -> np.ndarray:
+        """(g,) squares of what a residual (n, 3) N leaves of each group beside its likeliest nuisances, over
+        the variance of one sample, and of these: about three a sample where the noise is as said."""
+        squares = []
+        for block in self.blocks:
+            found, loud = self._nuisances(block, residual), self.louder[block.rows]
+            moved = (np.tril(block.factor[0]) @ block.halved).T @ found
+            left = residual[block.rows] - moved.reshape(-1, 3) * loud[:, None]
+            each = (left**2).sum(axis=1) / self.sample_variance[block.rows]
+            squares.append(each.sum() + found @ found)
+        return np.array(squares)
+
+    def _nuisances(self, block: WhitenedGroup, residual: np.ndarray) -> np.ndarray:
+        """(k,) the likeliest, in standard deviations."""
+        loud = self.louder[block.rows][:, None]
+        pulled = block.halved @ (residual[block.rows] / loud).reshape(-1) / self.variance
+        return solve_triangular(np.tril(block.factor[0]), pulled, lower=True, trans="T")
 
     @property
     def groups(self) -> int:
@@ -202,6 +221,11 @@ def nuisance_columns(
     normal = f[:, 0]
     zero = np.zeros_like(normal)
     tangential = np.column_stack([zero, f[:, 1], f[:, 2]])
+    late = np.zeros_like(f)
+    if options.latency_s > 0 and not t.quasi_static:
+        for part in t.parts:
+            if part.stop - part.start > 1:
+                late[part] = options.latency_s * np.gradient(f[part], t.t[part], axis=0)
     return [
         ("press", (np.nan_to_num(forward.predict(moved)) - f) * (onset_sd / small)[t.press][:, None]),
         ("place", f * site_sd[t.press][:, None]),
@@ -209,6 +233,7 @@ def nuisance_columns(
         ("site", np.column_stack([zero, normal, zero]) * options.tilt),
         ("site", np.column_stack([zero, zero, normal]) * options.tilt),
         ("press", tangential * options.stick),
+        ("press", late),
         ("place", f * (bend * forward.law_error(options.law)[t.press])[:, None]),
     ]
 

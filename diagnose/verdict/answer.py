@@ -78,9 +78,9 @@ def answer_of(findings: Findings, counts: np.ndarray) -> Answer:
     if not answer.names and not answer.remainder:
         answer.reasons.append("the remaining gap is no larger than noise, first touch and shape can explain")
     if misfit:
+        over, what = max((found.final.chi, "the noise"), (found.final.place_chi, "what places may be off by"))
         answer.reasons.append(
-            f"the best answer still misses by {np.sqrt(found.final.chi):.1f} times the noise: something else "
-            "is there"
+            f"the best answer still misses by {np.sqrt(over):.1f} times {what}: something else is there"
         )
     return answer
 
@@ -90,6 +90,8 @@ def _misfit(findings: Findings, counts: np.ndarray, answer: Answer) -> tuple[boo
     found, search = findings.found, findings.search
     slack = max([effect(n).hints.slack for n in found.chosen], default=1.0)
     most = slack * search.options.unknown_chi
+    if found.final.place_chi > most:
+        return True, False
     if found.final.chi <= most:
         return False, False
     rest, site = found.final.chi_but_for_one(counts)

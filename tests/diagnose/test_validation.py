@@ -69,14 +69,18 @@ def test_what_no_noise_tells_is_added(late):
 def test_what_one_place_alone_speaks_for_closes_nothing(late):
     """The other places would not have added it, so they do not predict it: as a lump under one place."""
     search, plain, _ = late
-    old = JudgedSet(plain, 0.5 * plain.gram[:, 0, 0], plain.raw[:, 0, 0].copy(), search.dof, 1.0)
+    old = JudgedSet(
+        plain, 0.5 * plain.gram[:, 0, 0], plain.raw[:, 0, 0].copy(), plain.gram[:, 0, 0], search.dof, 1.0
+    )
 
     def better_at(sites) -> Score:
         gram, lower = plain.gram.copy(), old.plain.copy()
         gram[sites, 0, 0] *= 0.2
         lower[sites] *= 0.2
         found = dataclasses.replace(plain, gram=gram)
-        return search.score([DELAY], JudgedSet(found, 0.5 * gram[:, 0, 0], lower, search.dof, 1.0), old)
+        return search.score(
+            [DELAY], JudgedSet(found, 0.5 * gram[:, 0, 0], lower, gram[:, 0, 0], search.dof, 1.0), old
+        )
 
     assert better_at([1]).share == better_at([1]).gain == 0.0
     assert better_at([1, 3, 5]).share > 0.05
