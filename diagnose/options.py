@@ -1,7 +1,7 @@
 """What a diagnosis can be set to: how much is tried, what decides a name, how wide our own errors are.
 
-All numbers that decide a name are in `AttributionOptions`; beside them stand the weights of evidence and
-closure, fitted to cases of known truth (search/naming.toml). Widths of our own errors default to their table
+All numbers that decide a name are in `AttributionOptions`; beside them stand the weights of evidence, fitted
+to cases of known truth (search/naming.toml). Widths of our own errors default to their table
 (mechanics.law_errors).
 """
 
@@ -12,7 +12,16 @@ from dataclasses import dataclass, replace
 from scipy.special import logit
 
 from palpate.mechanics.effects.registry import known
-from palpate.mechanics.law_errors import DepthLaw, Direction, FirstTouch, Repeats, Slip, Stiffness, Unnamed
+from palpate.mechanics.law_errors import (
+    DepthLaw,
+    Direction,
+    FirstTouch,
+    Latency,
+    Repeats,
+    Slip,
+    Stiffness,
+    Unnamed,
+)
 from palpate.mechanics.options import EXACT, option
 
 
@@ -85,7 +94,16 @@ class NuisanceOptions:
 
     onset_m: float = option(FirstTouch.diagnosis.value, "error of first touch, each press", unit="m")
     site_stiffness: float = option(
-        Stiffness.diagnosis.value, "share by which a site's stiffness may be wrong (shape, mesh)"
+        Stiffness.diagnosis.value,
+        "share by which a site's stiffness may be wrong, where the law's bound is not known",
+    )
+    law_bound: float = option(
+        Stiffness.bound.value,
+        "share by which a site's stiffness may be wrong by the law, in standard deviations of its bound",
+    )
+    surface: float = option(
+        Stiffness.surface.value,
+        "share by which a site's stiffness may be wrong, a unit of the surface's error over the height",
     )
     press_stiffness: float = option(Repeats.diagnosis.value, "share by which repeats at a site may differ")
     tilt: float = option(Direction.diagnosis.value, "error of a site's normal", unit="rad")
@@ -95,8 +113,14 @@ class NuisanceOptions:
     law: float = option(
         DepthLaw.diagnosis.value, "share by which a site's depth law may bend wrongly over the depth reached"
     )
+    latency_s: float = option(
+        Latency.diagnosis.value, "error of when the force is read, each press", unit="s"
+    )
     floor_share: float = option(
         Unnamed.share.value, "error of the model that no name covers, share of a sample's force"
+    )
+    floor_along: float = option(
+        Unnamed.along.value, "by how much that share's variance adds up along a press"
     )
     floor_n: float = option(
         Unnamed.force.value, "error of the model that no name covers, each thinned component", unit="N"

@@ -121,18 +121,8 @@ def search(
 ) -> Findings:
     """What explains the presses best: all that a verdict rests on."""
     readings, forward, tried = corrected.readings, corrected.forward, list(corrected.tried)
-    site_sd = site_stiffness_sd(forward, nuisance)
-    if readings.one_by_one:
-        # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
-        site_sd = np.full(len(readings.touches), nuisance.press_stiffness)
-    weighed = Search(
-        forward, forward.model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
-        finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
-    )  # fmt: skip
     progress("baseline", 0.12)
-    base = weighed.judge([weighed.finite_strain])
-    misfit = misfit_of(forward, base.found, site_sd)
-    weighed.starts = {e.name: e.hints.seek(forward, misfit) for e in tried if e.hints.seek is not None}
+    weighed = search_of(corrected, nuisance, rules)
     clock.lap("baseline")
     rigid, why = readings.rigid, list(corrected.offsets.reasons)
     seen = read_sideways(rigid, rules) & frozenset(e.name for e in tried)
@@ -150,9 +140,25 @@ def search(
         why.append(f"{name.replace('_', ' ')}: the presses do not confirm it, so it is not named")
     offsets = dataclasses.replace(corrected.offsets, reasons=tuple(why))
     return Findings(
-        forward, weighed, found, readings, offsets, site_sd, corrected.excluded,
+        forward, weighed, found, readings, offsets, weighed.site_sd, corrected.excluded,
         options.bootstrap, options.seed, refit=not options.fast,
     )  # fmt: skip
+
+
+def search_of(corrected: Corrected, nuisance: NuisanceOptions, rules: AttributionOptions) -> Search:
+    """Where the presses' evidence is weighed, with starts that are sought in what the ideal law leaves."""
+    forward, t = corrected.forward, corrected.readings.touches
+    # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
+    alike = np.full(len(t), nuisance.press_stiffness)
+    site_sd = alike if corrected.readings.one_by_one else site_stiffness_sd(forward, nuisance)
+    found = Search(
+        forward, forward.model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
+        finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
+    )  # fmt: skip
+    misfit = misfit_of(forward, found.judge([found.finite_strain]).found, site_sd)
+    seeking = [e for e in corrected.tried if e.hints.seek is not None]
+    found.starts = {e.name: e.hints.seek(forward, misfit) for e in seeking}
+    return found
 
 
 def with_tip_of(model: Model, presses: Presses) -> Model:

@@ -23,6 +23,7 @@ _EXPLORING = f"{_SET}; without errors that places share, sound silicones lose 'n
 _PLANNING = f"{_SET}; it ranks touches that are still to be made (docs/decisions/0150)"
 _SIMULATOR = f"{_SET}; names were tested on sealed flaws with it (`palpate bench simulated`)"
 _PIECES = f"{_SET}, for a machine's curves at the size of a hand (docs/decisions/0120)"
+_CONTROLS = "fitted to the presses of sound objects of the laboratory (`palpate bench places`)"
 _BOUND = "fitted to solved presses at places of known shapes (`palpate bench law-bound`)"
 
 
@@ -64,7 +65,14 @@ class FirstTouch:
 class Stiffness:
     """Share by which a place pushes back too much or too little, whatever the depth: law, mesh, shape."""
 
-    diagnosis = OwnError(0.03, "1", "stiffness of a place, where it is not solved", "place", _DIAGNOSIS)
+    diagnosis = OwnError(
+        0.03, "1", "stiffness of a place whose bound is not known: a running shape, a machine's curves",
+        "place", _DIAGNOSIS,
+    )  # fmt: skip
+    bound = OwnError(
+        1.4, "1", "stiffness of a place that is not solved, in standard deviations of the law's bound there",
+        "place", _CONTROLS,
+    )  # fmt: skip
     simulator = OwnError(
         0.03, "1", "stiffness on the surface that a simulator was given too", "place", _SIMULATOR
     )
@@ -77,8 +85,12 @@ class Stiffness:
         "together (`palpate bench press-solver --convergence`)",
     )  # fmt: skip
     surface = OwnError(
-        2.5, "1", "relative stiffness a unit of the surface's error over the object's height; edges near a "
-        "press count double", "place", _SET,
+        0.75, "1", "relative stiffness a unit of the surface's error over the object's height", "place",
+        _CONTROLS,
+    )  # fmt: skip
+    running_surface = OwnError(
+        2.5, "1", "the same of a surface that is still being explored; edges near a press count double",
+        "place", _SET,
     )  # fmt: skip
     shared_over = OwnError(
         0.03, "m", "distance over which neighbours share the stiffness of a place", "neighbours", _EXPLORING
@@ -166,6 +178,10 @@ class Slip:
 class Latency:
     """When the force is read."""
 
+    diagnosis = OwnError(
+        0.5e-3, "s", "time of the force relative to the position", "press",
+        "of 20 sound objects without it one is said to read late, by a thousandth of its force",
+    )  # fmt: skip
     common = OwnError(0.5e-3, "s", "time of the force relative to the position", "all places", _EXPLORING)
 
 
@@ -177,6 +193,13 @@ class Unnamed:
         "the laboratory's blind cases: with 0.5 % a sound dome stays unknown, with 1 % not; of 25 controls "
         "2 in place of 4 are given a cause",
     )  # fmt: skip
+    along = OwnError(
+        6.25, "1", "variance of that share in a sum along a press, over that of one anew at each sample",
+        "press",
+        "at a force of 300 times the noise a sound kidney's false causes gain up to 34 nats with 1, 7 with "
+        "6; causes that are there lose a fifth",
+    )  # fmt: skip
+    along_simulator = OwnError(1.0, "1", "the same against a simulator", "press", _SIMULATOR)
     share_exploring = OwnError(
         0.0, "1", "force in proportion to itself, in exploring", "sample",
         "'none' holds what is small against the force already (docs/decisions/0150)",

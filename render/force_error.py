@@ -20,7 +20,7 @@ from palpate.render.fem.renderer import FemRenderer
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.render.surface.snapping import ONSET_NOISE_M
 
-_SURE = 1.96
+SURE = 1.96
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
 
@@ -55,7 +55,7 @@ def force_errors(
     uncertain = felt_surface(renderer.model).uncertainty_m
     sd = uncertain[near] if len(uncertain) == len(surface.vertices) else np.zeros(len(size))
     onset = ONSET_NOISE_M if len(renderer.model.presses) else 0.0
-    return ForceErrors(shares * size, _SURE * sd * steepness, _SURE * onset * steepness)
+    return ForceErrors(shares * size, SURE * sd * steepness, SURE * onset * steepness)
 
 
 def error_figures(errors: ForceErrors | None) -> dict[str, float]:

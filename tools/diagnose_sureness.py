@@ -75,7 +75,7 @@ def stood(opened: dict[str, Any]) -> list[tuple[str, str, bool, float]]:
         weight = 1.0
         if how == UNNAMED and name in verdict.get("scores", {}):
             # a law without a number has none of its score
-            weight = float(np.nan_to_num(expit(WEIGHTS.log_odds(*verdict["scores"][name]))))
+            weight = float(np.nan_to_num(expit(WEIGHTS.log_odds(verdict["scores"][name][0]))))
         found.append((how, effect(name).role.name.lower(), there, weight))
     return found
 

@@ -1,17 +1,16 @@
-"""How evidence and closure weigh in naming an effect: fitted to judged cases, beside the weights in use.
+"""How evidence weighs in naming an effect: fitted to judged cases, beside the weights in use.
 
 Of every case that was judged blind: each effect of a step with its evidence (log10 of the gain in log
-likelihood of held-out places) and its closure (share of the held-out gap). What is there is told from what is
-not by a logistic regression with a ridge. Where nothing that is there is left to be named, all effects are
-false: a control's, and those of the steps after all true ones were picked. Else only the true ones count,
-where the fit found them at all (evidence above 10, something closed); after a wrong pick nothing does.
+likelihood). What is there is told from what is not by a logistic regression with a ridge. Where nothing that
+is there is left to be named, all effects are false: a control's, and those of the steps after all true ones
+were picked. Else only the true ones count, where the fit found them at all (evidence above 10, something of
+the gap closed); after a wrong pick nothing does. What closes nothing is never named, so it does not count.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from itertools import zip_longest
 from typing import Any
 
@@ -25,13 +24,13 @@ from palpate.mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
 from tools.script import script
 
-RIDGE = (5.0, 15.0)
-"""One standard deviation of the two weights' prior."""
+RIDGE = 10.0
+"""One standard deviation of the weight's prior."""
 FOUND = 10.0
 """Gain in log likelihood below which a fit has not found an effect."""
 
 
-KEYS = ("offset", "evidence", "closure")
+KEYS = ("offset", "evidence")
 BORDER = 4.0
 """Log odds within which a row is shown."""
 
@@ -52,17 +51,16 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     x = np.array([row[2] for row in rows])
     there = np.array([row[3] for row in rows])
     fitted = weights(x, there)
-    used = (WEIGHTS.offset, WEIGHTS.evidence, WEIGHTS.closure)
-    print(table(["", "offset", "evidence", "closure"], [
+    used = (WEIGHTS.offset, WEIGHTS.evidence)
+    print(table(["", *KEYS], [
         [name, *(f"{v:.2f}" for v in w)] for name, w in (("fitted", fitted), ("in use", used))]))  # fmt: skip
-    odds = x @ fitted[1:] + fitted[0]
+    odds = x * fitted[1] + fitted[0]
     border = sorted(np.flatnonzero(np.abs(odds) < BORDER), key=lambda i: -odds[i])
     lines = [
-        [f"{odds[i]:.1f}", "yes" if there[i] else "no", rows[i][1], f"{x[i, 0]:.2f}", f"{x[i, 1]:.2f}"]
-        + [rows[i][0]]
+        [f"{odds[i]:.1f}", "yes" if there[i] else "no", rows[i][1], f"{x[i]:.2f}"] + [rows[i][0]]
         for i in border
     ]
-    print(table(["log odds", "there", "effect", "log10 gain", "closure", "case"], lines))
+    print(table(["log odds", "there", "effect", "log10 gain", "case"], lines))
     values = "\n".join(f"{n} = {v:.2f}" for n, v in zip(KEYS, fitted, strict=True))
     write_fitted("diagnose_weights", arguments, f"[weights]\n{values}")
     return {
@@ -76,17 +74,16 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def rows_of(opened: dict[str, Any]) -> list[tuple[str, str, tuple[float, float], bool]]:
-    """(case, effect, (log10 evidence, closure), whether it is there) of one judged case."""
+def rows_of(opened: dict[str, Any]) -> list[tuple[str, str, float, bool]]:
+    """(case, effect, log10 evidence, whether it is there) of one judged case."""
     verdict, found = opened["verdict"], []
     left = {_phenomenon(name) for name in opened["case"]["tested"]}
     steps = [verdict.get("scores", {}), *verdict.get("later_scores", ())]
     for scores, pick in zip_longest(steps, verdict.get("picked", ())):
         for name, (gain, closes) in (scores or {}).items():
-            x = (float(np.log10(max(gain, 1.0))), float(np.clip(closes, -1, 1)))
             there = _phenomenon(name) in left
-            if np.isfinite(x).all() and (not left or (there and gain > FOUND and closes > 0)):
-                found.append((opened["key"], name, x, there))
+            if np.isfinite(gain) and closes > 0 and (not left or (there and gain > FOUND)):
+                found.append((opened["key"], name, float(np.log10(max(gain, 1.0))), there))
         if pick is None or _phenomenon(pick) not in left:
             break
         left.discard(_phenomenon(pick))
@@ -99,15 +96,14 @@ def _phenomenon(name: str) -> str:
     return known.get(name) or name
 
 
-def weights(x: np.ndarray, there: np.ndarray, ridge: Sequence[float] = RIDGE) -> np.ndarray:
-    """(3,) offset and weights. x: (n, 2) log10 evidence and closure; there: (n,) bool."""
+def weights(x: np.ndarray, there: np.ndarray, ridge: float = RIDGE) -> np.ndarray:
+    """(2,) offset and weight. x: (n,) log10 evidence; there: (n,) bool."""
     sign = np.where(there, 1.0, -1.0)
 
     def loss(w: np.ndarray) -> float:
-        odds = w[0] + x @ w[1:]
-        return float(np.logaddexp(0.0, -sign * odds).sum() + 0.5 * ((w[1:] / np.asarray(ridge)) ** 2).sum())
+        return float(np.logaddexp(0.0, -sign * (w[0] + x * w[1])).sum() + 0.5 * (w[1] / ridge) ** 2)
 
-    return np.asarray(minimize(loss, np.array([-10.0, 3.0, 8.0])).x)
+    return np.asarray(minimize(loss, np.array([-10.0, 8.0])).x)
 
 
 if __name__ == "__main__":

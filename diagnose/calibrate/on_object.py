@@ -91,7 +91,7 @@ def _calibration(
 ) -> Calibration:
     """What the fit says and, drawn from its covariance, within which limits."""
     forward, rng = search.forward, np.random.default_rng(seed)
-    spread = covariance(found, forward.touches.noise.variance_inflation, search.dof)
+    spread = covariance(found, search.dof)
     spread = spread + np.diag(_systematic(found) ** 2)
     drawn = rng.multivariate_normal(found.values, spread, _DRAWS, check_valid="ignore")
     drawn = np.clip(drawn, *bounds_of(found.effects)[:2])

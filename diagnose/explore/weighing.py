@@ -25,7 +25,7 @@ from palpate.diagnosis.options import NuisanceOptions
 from palpate.diagnosis.search.descent import first_touches, fit
 from palpate.diagnosis.search.fit import Fit, settings_of
 from palpate.diagnosis.search.gaps import modulus_share
-from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
+from palpate.diagnosis.search.site_stiffness import surface_error
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.compliance.far_field import energy_fields
 from palpate.mechanics.compliance.pressed_places import places_at
@@ -128,8 +128,9 @@ def softer(compliance: np.ndarray) -> Act:
 LEAST_PRESSES = 6
 SUPPORT_GIVES = 1.5e-5
 """m/N, standard deviation of what a support or its tracing seems to yield by itself."""
-NUISANCE = NuisanceOptions(floor_share=Unnamed.share_exploring.value)
-"""As a diagnosis has them, but that 'none' holds what is small against the force already."""
+NUISANCE = NuisanceOptions(floor_share=Unnamed.share_exploring.value, latency_s=0.0)
+"""As a diagnosis has them, but that none holds what is small against the force already, and all presses share
+when the force is read."""
 LITTLE = 0.1
 """1/m, of compliance for unit modulus, small against a place's own (some 10)."""
 
@@ -267,7 +268,8 @@ def forward_of(estimate: ExplorationEstimate) -> tuple[Forward, np.ndarray] | No
         # bias, drift and the tool's weight are read in free air, not in presses
         free = free_air_of(e.exploration.recording, e.presses_placed)
         find_instrument_offsets(forward, free, None, set())
-    return forward, site_stiffness_sd(forward, NUISANCE)
+    of_law, of_surface = NUISANCE.site_stiffness, Stiffness.running_surface.value * surface_error(forward)
+    return forward, np.hypot(of_law, of_surface)
 
 
 def _model(e: ExplorationEstimate, presses: Presses) -> Model:

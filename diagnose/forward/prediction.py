@@ -61,10 +61,10 @@ class Forward:
         exact = None if self.exact is None else self.exact.of(presses)
         return replace(self, touches=self.touches.of(presses), places=self.places.of(presses), exact=exact)
 
-    def law_error(self, usual: float) -> np.ndarray:
+    def law_error(self, usual: float | np.ndarray) -> np.ndarray:
         """(p,) standard error of the law as a share of the force; the usual one where nothing is solved."""
         if self.exact is None:
-            return np.full(len(self.touches), usual)
+            return np.broadcast_to(usual, len(self.touches)).astype(float)
         return next(iter(self.exact.factors.values())).law_error(usual)
 
     @property

@@ -39,6 +39,8 @@ NUISANCE = NuisanceOptions(
     press_stiffness=Repeats.simulator.value,
     law=DepthLaw.simulator.value,
     floor_share=Unnamed.share_simulator.value,
+    floor_along=Unnamed.along_simulator.value,
+    latency_s=0.0,
     floor_n=Unnamed.force_simulator.value,
 )
 """One standard deviation of what our law misses on the surface that a simulator was given too."""

@@ -42,10 +42,13 @@ def drop_redundant(
     """
     effects = [e for e in current.found.effects if e.name in chosen]
     base = [e for e in current.found.effects if e.name not in chosen]
-    others = [s.effect for s in alone.values() if s.name not in chosen and search.passes(s)]
+    # what is certainly less likely by itself is not what fewer effects would be
+    least = max((alone[n].log_odds for n in chosen if n in alone), default=0.0) - search.options.beyond_doubt
+    able = (s for s in alone.values() if s.name not in chosen and search.passes(s) and s.log_odds > least)
+    others = [s.effect for s in able]
     others.sort(key=lambda e: -alone[e.name].gain)
     own = _cost(search, current)
-    over = max(1.0, current.chi) * search.forward.touches.noise.variance_inflation
+    over = current.over
     found = []
     for tried in _sets(effects, others[:TRIED], seen):
         candidate = search.judge([*base, *tried])
@@ -165,7 +168,7 @@ def attribute(
             break
         first = not chosen
         for score in list(scores.values()):
-            if score.may_be and not search.passes(score, first=first):
+            if score.probability > search.options.sure and not search.passes(score, first=first):
                 scores[score.name] = _reexamined(search, score, current)
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
@@ -184,7 +187,7 @@ def attribute(
             search.renew(pair.found)
             current, strain_gain, strain_closes = _with_strain(search, pair.found.effects)
             break
-        best = _likeliest(passing, search.options.beyond_doubt)
+        best = max(passing, key=lambda s: s.log_odds)
         for effect in effects:
             if of_one_phenomenon(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
@@ -211,13 +214,6 @@ def attribute(
         base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps),
         taken, strain_gain, strain_closes, known_p[0],
     )  # fmt: skip
-
-
-def _likeliest(passing: Sequence[Score], beyond_doubt: float) -> Score:
-    """The score that gains most of those as likely to be there as any; a fit that does not carry over is
-    not."""
-    best = max(s.log_odds for s in passing)
-    return max((s for s in passing if s.log_odds > best - beyond_doubt), key=lambda s: s.gain)
 
 
 def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:
@@ -308,7 +304,7 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[JudgedSet, 
     of held-out squares, N^2: a law may be far likelier where noise is small, and still predict worse."""
     rest = [e for e in effects if e is not search.finite_strain]
     without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
-    over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.noise.variance_inflation
+    over = min(without.over, deep.over)
     each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
     # the site that speaks loudest, for or against, may be one that slipped
     gain = (each.sum() - each.max() - each.min()) / over
@@ -335,7 +331,7 @@ def _without_idle(
         if effect.hints.slips and search.sideways_off(without):
             continue
         score = search.score([effect], current, without)
-        if not score.may_be:
+        if score.probability <= search.options.doubt:
             chosen.remove(name)
             current = without
     return current, chosen

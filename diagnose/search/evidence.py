@@ -13,11 +13,12 @@ from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.descent import Descent, first_touches, fit
 from palpate.diagnosis.search.fit import Fit, settings_of
-from palpate.diagnosis.search.gaps import closed_share, lower_closure
+from palpate.diagnosis.search.gaps import closed_share
 from palpate.diagnosis.search.leave_one_out import JudgedSet, held_out
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.effects.settings import ForwardSettings
 
 
 class Search:
@@ -36,8 +37,9 @@ class Search:
         site_sd: np.ndarray | None,
         finite_strain: Effect,
     ) -> None:
-        self.forward, self.options, self.nuisance, self.site_sd = forward, options, nuisance, site_sd
-        whitener = Whitener(forward, forward.ideal(modulus), nuisance, site_sd)
+        self.forward, self.options, self.nuisance = forward, options, nuisance
+        self.site_sd = np.full(len(forward.touches), nuisance.site_stiffness) if site_sd is None else site_sd
+        whitener = self._whitener(forward.ideal(modulus))
         onset = first_touches(forward, whitener, modulus)
         rough = fit(forward, whitener, [finite_strain], modulus=modulus, onset=onset)
         self.finite_strain = finite_strain
@@ -49,10 +51,14 @@ class Search:
         """N rms of a 3-vector: the smallest gap that matters."""
         return self.options.smallest * self.forward.touches.vector_noise_n
 
+    def _whitener(self, settings: ForwardSettings) -> Whitener:
+        slow = self.forward.touches.noise.variance_inflation
+        return Whitener(self.forward, settings, self.nuisance, self.site_sd, slow=slow)
+
     def renew(self, found: Fit) -> None:
         """Weigh from now on with the nuisances as they are at a fit; earlier judgements are forgotten."""
         settings = settings_of(self.forward, found.effects, found.values, found.onset)
-        self.whitener = Whitener(self.forward, settings, self.nuisance, self.site_sd)
+        self.whitener = self._whitener(settings)
         self.dof = 3.0 * float(self.whitener.counts().sum())
         self._near = found
         self._cache: dict[tuple[str, ...], JudgedSet] = {}
@@ -79,20 +85,24 @@ class Search:
         runs = (descent.run(starts[i], near.onset, 12) for i in np.argsort(scored)[:3])
         found = min(runs, key=lambda f: f.loss)
         held, plain = held_out(found, descent)
-        candidate = JudgedSet(found, held, plain, self.dof)
+        # the widths of a simulator's comparison are set by hand, so nothing is told by what exceeds them
+        wide = self.whitener.place_chi(found.residual) if self.forward.measured else 1.0
+        missed = self.whitener.misfit(found.residual)
+        candidate = JudgedSet(found, held, plain, missed, self.dof, wide)
         self._cache[key] = candidate
         return candidate
 
     def score(self, added: Sequence[Effect], new: JudgedSet, old: JudgedSet) -> Score:
         """Compare a candidate with the one that lacks `added`."""
         extra = len(new.found.values) - len(old.found.values)
-        over = max(1.0, new.chi) * self.forward.touches.noise.variance_inflation
+        between = all(e.scope.between_places for e in added)
+        over = new.over if between else max(1.0, new.chi)
         fitted = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
         # predicted with what the other places alone would have added: a lump under one place is none
         predicted = (fitted.sum() - fitted) / over > extra
         per_group = np.where(predicted, old.held - new.held, 0.0)
         gain = float(per_group.sum())
-        if all(e.scope.between_places for e in added):
+        if between:
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = fitted
             gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
@@ -108,14 +118,13 @@ class Search:
         least = self.smallest_n**2
         samples = self.whitener.counts()
         share = float(closed_share(was, left, samples, noise, least))
-        closes = lower_closure(was, left, samples, noise, least, self.options.doubt)
-        return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
+        return Score(tuple(added), float(gain / over), size, share, per_group / over, new)
 
     def passes(self, score: Score, *, first: bool = True) -> bool:
         """Whether a score names its effect. first: nothing else is named yet."""
         if score.effect.hints.by_first_touches and not first:
             return False
-        return score.closure > 0 and score.probability > self.options.sure
+        return score.share > 0 and score.probability > self.options.sure
 
     def sideways_off(self, candidate: JudgedSet) -> float:
         """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.

@@ -100,15 +100,15 @@ def bounds_of(
 DRAWS = 200
 
 
-def covariance(found: Fit, slowness: float, dof: float) -> np.ndarray:
-    """(k, k) of the fit's values: the whitened curvature, widened by the lack of fit, by slow noise, and to
+def covariance(found: Fit, dof: float) -> np.ndarray:
+    """(k, k) of the fit's values: the whitened curvature, widened by the lack of fit, and to
     what the sites' own pulls scatter (cluster-robust, sites as clusters)."""
     total = found.gram.sum(axis=0)
     hessian = total[1:, 1:] + np.diag(found.prior)
     hessian = hessian + 1e-9 * np.diag(np.maximum(np.diag(hessian), 1e-12))
     inverse = np.linalg.inv(hessian)
     chi = max(1.0, float(total[0, 0] / dof))
-    formal = inverse * chi * slowness
+    formal = inverse * chi
     pulls = found.gram[:, 0, 1:]
     groups = len(pulls)
     pulls = pulls - pulls.mean(axis=0)
@@ -130,7 +130,7 @@ def parameter_intervals(
     if k == 0:
         return {}
     own = found.place_of(name)
-    spread = covariance(found, forward.touches.noise.variance_inflation, dof)[own, own]
+    spread = covariance(found, dof)[own, own]
     systematic = np.array(effect.hints.systematic or np.zeros(k))
     share = np.array(effect.hints.systematic_share or np.zeros(k))
     spread = spread + np.diag(systematic**2 + (share * found.values[own]) ** 2)

@@ -20,13 +20,21 @@ linear answer is no place that the other groups would choose."""
 
 @dataclass(frozen=True)
 class JudgedSet:
-    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the
-    base."""
+    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and `misfit` and
+    `place_chi` of what it leaves (search.whiten): by so much our own errors are wider than said, if that is
+    all."""
 
     found: Fit
     held: np.ndarray
     plain: np.ndarray
+    misfit: np.ndarray
     dof: float
+    place_chi: float
+
+    @property
+    def over(self) -> float:
+        """What gains by what differs from place to place are divided by: the set's own lack of fit."""
+        return max(1.0, self.chi, self.place_chi)
 
     @property
     def residual(self) -> np.ndarray:
@@ -40,12 +48,12 @@ class JudgedSet:
 
     @property
     def chi(self) -> float:
-        """Whitened mean square per component: about 1 where the noise model holds."""
-        return float(self.found.gram[:, 0, 0].sum() / self.dof)
+        """Mean square per component over that of the noise: about 1 where the noise model holds."""
+        return float(self.misfit.sum() / self.dof)
 
     def chi_but_for_one(self, counts: np.ndarray) -> tuple[float, int]:
         """(chi without the site that misses most, that site); counts: (g,) samples of each site."""
-        each = self.found.gram[:, 0, 0]
+        each = self.misfit
         worst = int(np.argmax(each / counts))
         return float((each.sum() - each[worst]) / (3.0 * (counts.sum() - counts[worst]))), worst
 

@@ -16,7 +16,7 @@ from scipy.special import expit
 
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.gaps import RESAMPLES, beside_modulus_n, closed_share
+from palpate.diagnosis.search.gaps import beside_modulus_n
 from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import WEIGHTS
 from palpate.diagnosis.search.rivals import of_one_phenomenon
@@ -89,11 +89,7 @@ class Patterns:
         both = np.concatenate([shown, drawn], axis=2)
         self.white = Products.of(whitener.gram(both), shown.shape[2])
         self.plain = Products.of(whitener.raw_gram(both), shown.shape[2])
-        self.counts = whitener.counts()
-        self.over = forward.touches.noise.variance_inflation
-        groups = len(self.counts)
-        picks = np.random.default_rng(0).integers(0, groups, (RESAMPLES, groups))
-        self.weights = np.stack([np.bincount(p, minlength=groups) for p in picks]).astype(float)
+        self.groups = whitener.groups
 
     def limit(self, number: int) -> float:
         """N rms from which NAMED of the draws name this effect."""
@@ -137,35 +133,24 @@ class Patterns:
         effect, options = self.effects[number], self.search.options
         forms = np.flatnonzero(self.own == number)
         column = 1 + forms[np.argmax(gains[:, forms], axis=1)]
-        extra, groups = len(effect.parameters), len(self.counts)
+        extra, groups = len(effect.parameters), self.groups
         old, new = white.fitted(None), white.fitted(column)
         each = 0.5 * (old.loss - new.loss)
-        predicted = (each.sum(axis=1, keepdims=True) - each) / self.over > extra
+        predicted = each.sum(axis=1, keepdims=True) - each > extra
         per_group = np.where(predicted, 0.5 * (old.held - new.held), 0.0)
         gain = per_group.sum(axis=1)
         if effect.scope.between_places:
             per_group = each
             gain = each.sum(axis=1) - 0.5 * np.log(groups) * extra
-        gain, per_group = gain / self.over, per_group / self.over
         lump = effect.hints.few_places
         evidence = gain - (np.log(groups) if lump else np.maximum(per_group.max(axis=1), 0.0))
         was = plain.left(None, old.amplitude, not lump)
         left = plain.left(column, new.amplitude if lump else new.by_others, not lump)
         if not lump:
             left = np.where(predicted, left, was)
-        closure = self._closed(was, left, lump, options.doubt)
-        odds = WEIGHTS.log_odds(evidence, closure)
-        return Linear((closure > 0) & (expit(odds) > options.sure), odds, gain)
-
-    def _closed(self, was: np.ndarray, left: np.ndarray, lump: bool, doubt: float) -> np.ndarray:
-        """(d,) the share of the gap that is closed; but for a lump at least, over resampled groups."""
-        noise, least = 3 * self.search.forward.touches.noise_n**2, self.search.smallest_n**2
-        if lump:
-            return closed_share(was, left, self.counts, noise, least)
-        # sums of resampled groups, by products: (resamplings, d) each
-        n = (self.weights @ self.counts)[:, None, None]
-        before, after = ((self.weights @ x.T)[:, :, None] for x in (was, left))
-        return np.quantile(closed_share(before, after, n, noise, least), doubt, axis=0)
+        odds = WEIGHTS.log_odds(evidence)
+        closes = (was - left).sum(axis=1) > 0
+        return Linear(closes & (expit(odds) > options.sure), odds, gain)
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
 """When an effect is named: the probability that what a score says is there, and not our own law's error.
 
-Two things are asked of places that the fit has not seen. How much more likely does the effect make them (its
-evidence)? And how much of the plain gap does it close there, at least (its closure)? A law is never exact:
-what it misses is felt at many places, so evidence alone grows with the force over the noise without end, and
-a gap that closes a little closes by chance. Together they tell causes from errors of ours; how they weigh was
-fitted once, to the recordings that stand beside the weights.
+How much more likely does the effect make what was pressed (its evidence)? A law is never exact: what it
+misses is felt at many places, so evidence would grow with the force over the noise without end. So it counts
+in units of what the effect leaves at the places, over what our own errors are said to be (JudgedSet.over):
+the right cause leaves no more than that, an error of ours that is bent into another form does. What makes
+places worse that the fit has not seen is no cause. How much of the gap a cause closes says whether it
+matters, never whether it is there. The weights were fitted once, to the recordings that stand beside them.
 """
 
 from __future__ import annotations
@@ -23,17 +24,14 @@ from palpate.mechanics.effects.base import Effect
 
 @dataclass(frozen=True)
 class Weights:
-    """Log odds = offset + evidence * log10(gain in log likelihood) + closure * share of the held-out gap."""
+    """Log odds = offset + evidence * log10(gain in log likelihood)."""
 
     offset: float
     evidence: float
-    closure: float
 
-    def log_odds(self, gain: ArrayLike, closes: ArrayLike) -> np.ndarray:
-        """(...) that an effect is there. gain: log likelihood, of held-out places. closes: share of the
-        gap."""
-        evidence = np.log10(np.maximum(gain, 1.0))
-        return np.asarray(self.offset + self.evidence * evidence + self.closure * np.clip(closes, -1, 1))
+    def log_odds(self, gain: ArrayLike) -> np.ndarray:
+        """(...) that an effect is there. gain: log likelihood."""
+        return np.asarray(self.offset + self.evidence * np.log10(np.maximum(gain, 1.0)))
 
 
 FILE = Path(__file__).with_name("naming.toml")
@@ -47,15 +45,13 @@ class Score:
 
     added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
     per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N.
-    share: of the old held-out excess over the noise (of a lump, of the fitted one). closes: the same, at
-    least, over resampled sites.
+    share: of the old held-out excess over the noise that it closes (of a lump, of the fitted one).
     """
 
     added: tuple[Effect, ...]
     gain: float
     size_n: float
     share: float
-    closes: float
     per_group: np.ndarray
     candidate: JudgedSet
 
@@ -78,22 +74,16 @@ class Score:
         return self.gain - max(float(self.per_group.max()), 0.0)
 
     @property
-    def closure(self) -> float:
-        """The share of the held-out gap that counts: at least so much; of a lump, which closes it in few
-        places, as it is."""
-        return self.share if self.effect.hints.few_places else self.closes
+    def by_one_place(self) -> bool:
+        """Whether one place alone speaks for it."""
+        return float(self.per_group.sum() - self.per_group.max()) <= 0
 
     @property
     def log_odds(self) -> float:
         """That it is there, rather than an error of our own law."""
-        return float(WEIGHTS.log_odds(self.evidence, self.closure))
+        return float(WEIGHTS.log_odds(self.evidence))
 
     @property
     def probability(self) -> float:
         """The same as a probability."""
         return float(expit(self.log_odds))
-
-    @property
-    def may_be(self) -> bool:
-        """Whether it would be as likely as not if it closed the whole gap."""
-        return float(WEIGHTS.log_odds(self.evidence, 1.0)) > 0

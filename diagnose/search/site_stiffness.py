@@ -8,25 +8,41 @@ from scipy.spatial import cKDTree
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import NuisanceOptions
 from palpate.diagnosis.search.fit import Fit
-from palpate.mechanics.law_errors import Repeats, Stiffness
+from palpate.mechanics.contact.edges import nearness
+from palpate.mechanics.law_errors import Repeats
 from palpate.mechanics.presses.table import Presses
+from palpate.render.force_error import SURE, law_share
 
 
 def site_stiffness_sd(forward: Forward, options: NuisanceOptions) -> np.ndarray:
     """(p,) share by which a press's stiffness may be wrong: mesh and law, or the solution of its place, and
     the surface's own uncertainty."""
+    of_law = forward.law_error(options.law_bound * bound_sd(forward))
+    return np.hypot(of_law, options.surface * surface_error(forward))
+
+
+def surface_error(forward: Forward) -> np.ndarray:
+    """(p,) standard error of the surface about each press, over the object's height; 0 where it is known."""
     touches, model = forward.touches, forward.model
-    of_law = forward.law_error(options.site_stiffness)
     if model.shape_uncertainty_m is None:
-        return of_law
+        return np.zeros(len(touches))
     surface = np.flatnonzero(model.mesh.touchable)
     height = np.ptp(model.support.height(model.mesh.points))
     tree = cKDTree(model.mesh.points[surface])
     near = tree.query_ball_point(touches.point, 0.35 * height)
-    spread = np.array(
-        [np.sqrt(np.mean(model.shape_uncertainty_m[surface[i]] ** 2)) if len(i) else 0.0 for i in near]
-    )
-    return np.sqrt(of_law**2 + (Stiffness.surface.value * spread / height) ** 2)
+    of = model.shape_uncertainty_m[surface]
+    return np.array([np.sqrt(np.mean(of[i] ** 2)) if len(i) else 0.0 for i in near]) / height
+
+
+def bound_sd(forward: Forward) -> np.ndarray:
+    """(p,) one standard deviation of the bound that the law carries at each press, of a shallow dent, as a
+    share of the force (render.force_error.law_share)."""
+    t, places, model = forward.touches, forward.places, forward.model
+    sideways = np.linalg.norm(places.far[:, 1:, 0], axis=1) * t.tip_radius_m
+    bent = np.abs(places.curvature) * t.tip_radius_m
+    rim, base = nearness(model.mesh, t.point, t.normal)
+    ratio = model.material.poisson_ratio
+    return law_share(np.zeros(len(t)), bent, sideways, rim, base, poisson_ratio=ratio) / SURE
 
 
 def site_factors(found: Fit, touches: Presses) -> tuple[np.ndarray, np.ndarray]:

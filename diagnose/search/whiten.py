@@ -25,6 +25,8 @@ from palpate.mechanics.effects.settings import ForwardSettings
 from palpate.mechanics.presses.table import Presses
 
 _FEW_COLUMNS = 3
+_LEAST = 1e-6
+"""Share of a nuisance's variance that the readings tell, at least."""
 _MODES = 2
 """Of a Brownian bridge, that hold 76 % of its variance; the rest counts as noise."""
 
@@ -32,11 +34,13 @@ _MODES = 2
 @dataclass
 class WhitenedGroup:
     """One group's rows (flat indices of counted samples), the factor L of I + N^T N / sigma^2, and L^-1 N^T,
-    N the nuisances over how much louder than sigma their rows are."""
+    N the nuisances over how much louder than sigma their rows are. own: which of them are the place's own
+    stiffness and depth law."""
 
     rows: np.ndarray
     factor: tuple
     halved: np.ndarray
+    own: np.ndarray
 
 
 class Whitener:
@@ -52,15 +56,19 @@ class Whitener:
         options: NuisanceOptions,
         site_sd: np.ndarray | None = None,
         onset_sd: np.ndarray | None = None,
+        slow: float = 1.0,
     ) -> None:
         """site_sd: (p,) share by which each press's stiffness may be off; by default the options'. onset_sd:
-        (p,) m, of each first touch; by default the options' and what the table states of each."""
+        (p,) m, of each first touch; by default the options' and what the table states of each. slow: by how
+        much more than white the noise counts (its variance), as slow noise adds up along a press."""
         self.touches = forward.touches
-        self.variance = self.touches.noise_n**2 + options.floor_n**2
+        at_once = self.touches.noise_n**2 + options.floor_n**2
+        self.variance = slow * self.touches.noise_n**2 + options.floor_n**2
         before = np.nan_to_num(forward.predict(settings))
-        share = options.floor_share * np.linalg.norm(before, axis=1)
+        share = np.sqrt(options.floor_along) * options.floor_share * np.linalg.norm(before, axis=1)
         bridges, self.air, unbridged = _bridges(self.touches)
         self.louder = np.sqrt(1 + (share**2 + unbridged) / self.variance)
+        self.sample_variance = at_once + share**2 / options.floor_along + unbridged
         self.blocks: list[WhitenedGroup] = []
         presses = len(self.touches)
         stated = np.hypot(options.onset_m, self.touches.onset_error_m)
@@ -71,18 +79,50 @@ class Whitener:
         if settings.unsure_m is not None:
             slope = np.linalg.norm(self.onset_column, axis=1)
             self.louder = np.sqrt(self.louder**2 + (slope * settings.unsure_m) ** 2 / self.variance)
+            self.sample_variance = self.sample_variance + (slope * settings.unsure_m) ** 2
         site = options.site_stiffness if site_sd is None else site_sd
         self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(presses)
         brought = 0.0
-        for rows, matrix in _by_site(self.touches, columns):
+        for rows, matrix, own in _by_site(self.touches, columns):
             brought += float((matrix**2).sum() + 3 * self.variance * (self.louder[rows] ** 2).sum())
             matrix /= np.repeat(self.louder[rows], 3)[:, None]
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
             factor = cho_factor(small, lower=True)
             halved = solve_triangular(factor[0], matrix.T, lower=True)
-            self.blocks.append(WhitenedGroup(rows, factor, halved))
+            self.blocks.append(WhitenedGroup(rows, factor, halved, own))
         self.explained = brought / float(self.counts().sum())
         """N^2, the mean square of a sample's 3-vector that noise and nuisances bring about."""
+
+    def place_chi(self, residual: np.ndarray) -> float:
+        """Mean square of what a residual (n, 3) N asks of each place's own stiffness and depth law, in
+        standard deviations of what the covariance expects: about 1 where our own errors are as wide as said.
+        The place that misses most is left out: a touch there may have slipped."""
+        each = []
+        for block in self.blocks:
+            found = self._nuisances(block, residual)[block.own]
+            lower = np.tril(block.factor[0])
+            unit = np.eye(len(lower))[:, block.own]
+            left = (solve_triangular(lower, unit, lower=True) ** 2).sum(axis=0)
+            each.append(np.mean(found**2 / np.maximum(1 - left, _LEAST)))
+        return float((np.sum(each) - np.max(each)) / max(len(each) - 1, 1))
+
+    def misfit(self, residual: np.ndarray) -> np.ndarray:
+        """(g,) squares of what a residual (n, 3) N leaves of each group beside its likeliest nuisances, over
+        the variance of one sample, and of these: about three a sample where the noise is as said."""
+        squares = []
+        for block in self.blocks:
+            found, loud = self._nuisances(block, residual), self.louder[block.rows]
+            moved = (np.tril(block.factor[0]) @ block.halved).T @ found
+            left = residual[block.rows] - moved.reshape(-1, 3) * loud[:, None]
+            each = (left**2).sum(axis=1) / self.sample_variance[block.rows]
+            squares.append(each.sum() + found @ found)
+        return np.array(squares)
+
+    def _nuisances(self, block: WhitenedGroup, residual: np.ndarray) -> np.ndarray:
+        """(k,) the likeliest, in standard deviations."""
+        loud = self.louder[block.rows][:, None]
+        pulled = block.halved @ (residual[block.rows] / loud).reshape(-1) / self.variance
+        return solve_triangular(np.tril(block.factor[0]), pulled, lower=True, trans="T")
 
     @property
     def groups(self) -> int:
@@ -167,7 +207,8 @@ def nuisance_columns(
     site_sd: np.ndarray | None,
     onset_sd: np.ndarray,
 ) -> list[tuple[str, np.ndarray]]:
-    """('press' or 'site', (n, 3)) pairs: the change of force for one standard deviation of each nuisance.
+    """('press', 'site' or, of a place's own law, 'place', (n, 3)) pairs: the change of force for one standard
+    deviation of each nuisance.
     before: (n, 3) N, what is predicted."""
     t, f = forward.touches, before
     moved = forward.ideal(settings.modulus)
@@ -180,14 +221,20 @@ def nuisance_columns(
     normal = f[:, 0]
     zero = np.zeros_like(normal)
     tangential = np.column_stack([zero, f[:, 1], f[:, 2]])
+    late = np.zeros_like(f)
+    if options.latency_s > 0 and not t.quasi_static:
+        for part in t.parts:
+            if part.stop - part.start > 1:
+                late[part] = options.latency_s * np.gradient(f[part], t.t[part], axis=0)
     return [
         ("press", (np.nan_to_num(forward.predict(moved)) - f) * (onset_sd / small)[t.press][:, None]),
-        ("site", f * site_sd[t.press][:, None]),
+        ("place", f * site_sd[t.press][:, None]),
         ("press", f * options.press_stiffness),
         ("site", np.column_stack([zero, normal, zero]) * options.tilt),
         ("site", np.column_stack([zero, zero, normal]) * options.tilt),
         ("press", tangential * options.stick),
-        ("site", f * (bend * forward.law_error(options.law)[t.press])[:, None]),
+        ("press", late),
+        ("place", f * (bend * forward.law_error(options.law)[t.press])[:, None]),
     ]
 
 
@@ -216,19 +263,23 @@ def _bridges(t: Presses) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
     return [axes[:, :, k] * bump[:, None] for bump in bumps for k in range(3)], air, left
 
 
-def _by_site(t: Presses, columns: list[tuple[str, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:
+def _by_site(
+    t: Presses, columns: list[tuple[str, np.ndarray]]
+) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """(rows, (3 r, k) nuisances, those of the place's own law) of each site."""
     result = []
     site_of_row = t.site[t.press]
     for site in range(t.sites):
         rows = np.flatnonzero((site_of_row == site) & t.counted)
-        matrix = []
+        matrix, own_law = [], []
         for level, column in columns:
             part = column[rows]
-            if level == "site":
+            if level != "press":
+                own_law += [len(matrix)] * (level == "place")
                 matrix.append(part.reshape(-1))
                 continue
             for press in np.flatnonzero(t.site == site):
                 own = part * (t.press[rows] == press)[:, None]
                 matrix.append(own.reshape(-1))
-        result.append((rows, np.stack(matrix, axis=1)))
+        result.append((rows, np.stack(matrix, axis=1), np.array(own_law)))
     return result

@@ -136,7 +136,9 @@ def _nuisance(bench: Bench) -> NuisanceOptions:
     """Pieces differ in more than their stiffness, and a machine's zero is worth what its load is: the
     floor is a share of the greatest."""
     of_peak = Unnamed.peak_pieces if bench.specimens else Unnamed.peak_one_piece
-    plain = NuisanceOptions(floor_n=of_peak.value * PEAK_N, floor_share=Unnamed.share_curves.value)
+    plain = NuisanceOptions(
+        floor_n=of_peak.value * PEAK_N, floor_share=Unnamed.share_curves.value, latency_s=0.0
+    )
     if not bench.specimens:
         return plain
     return dataclasses.replace(

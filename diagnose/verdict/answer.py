@@ -78,9 +78,9 @@ def answer_of(findings: Findings, counts: np.ndarray) -> Answer:
     if not answer.names and not answer.remainder:
         answer.reasons.append("the remaining gap is no larger than noise, first touch and shape can explain")
     if misfit:
+        over, what = max((found.final.chi, "the noise"), (found.final.place_chi, "what places may be off by"))
         answer.reasons.append(
-            f"the best answer still misses by {np.sqrt(found.final.chi):.1f} times the noise: something else "
-            "is there"
+            f"the best answer still misses by {np.sqrt(over):.1f} times {what}: something else is there"
         )
     return answer
 
@@ -90,6 +90,8 @@ def _misfit(findings: Findings, counts: np.ndarray, answer: Answer) -> tuple[boo
     found, search = findings.found, findings.search
     slack = max([effect(n).hints.slack for n in found.chosen], default=1.0)
     most = slack * search.options.unknown_chi
+    if found.final.place_chi > most:
+        return True, False
     if found.final.chi <= most:
         return False, False
     rest, site = found.final.chi_but_for_one(counts)
@@ -150,11 +152,11 @@ def finite_strain_size(forward: Forward, found: Fit) -> float:
 
 
 def _unconfirmed_lump(findings: Findings, answer: Answer) -> None:
-    """A lump that closes something by one place alone may be a shape that is wrong there."""
+    """A lump that one place alone speaks for may be a shape that is wrong there."""
     found = findings.found
     for scores, name in zip(found.steps, found.picked, strict=False):
         lives_in_few = name in scores and scores[name].effect.hints.few_places
-        if lives_in_few and name in found.chosen and scores[name].closes <= 0:
+        if lives_in_few and name in found.chosen and scores[name].by_one_place:
             answer.candidates += _rest()
             answer.reasons.append("only one place shows the lump: the shape may be wrong there instead")
 
@@ -178,7 +180,9 @@ def _shape(findings: Findings, answer: Answer) -> None:
             answer.candidates += [
                 s.name
                 for s in ranked
-                if s.effect.hints.shape_rival and s.may_be and found.confidence_set_p[s.name] > doubt
+                if s.effect.hints.shape_rival
+                and s.probability > findings.search.options.sure
+                and found.confidence_set_p[s.name] > doubt
             ]
         answer.reasons.append(
             f"places differ in stiffness by {100 * spread:.0f} % more than the shape's uncertainty"

@@ -52,9 +52,9 @@ class DepthFactors:
             self.cubic[rows], self.shallowest_m[rows], self.deepest_m[rows], self.solved[rows]
         )
 
-    def law_error(self, usual: float) -> np.ndarray:
+    def law_error(self, usual: float | np.ndarray) -> np.ndarray:
         """(k,) standard error of the law as a share of the force: the usual one where nothing is solved."""
-        return np.where(self.solved, min(usual, Stiffness.solved.value), usual)
+        return np.where(self.solved, np.minimum(usual, Stiffness.solved.value), usual)
 
     def at(self, place: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
         """(n,) factors at places (n,) and depths (n,) m."""

@@ -13,10 +13,10 @@ from palpate.diagnosis.search.naming import Score
 from palpate.mechanics.effects.registry import effect
 
 
-def score(name, per_group, closes=0.6, share=0.7):
+def score(name, per_group, share=0.7):
     gains = np.asarray(per_group, float)
     return Score(
-        (effect(name),), gain=gains.sum(), size_n=0.014, share=share, closes=closes, per_group=gains,
+        (effect(name),), gain=gains.sum(), size_n=0.014, share=share, per_group=gains,
         candidate=SimpleNamespace(chi=0.85),
     )  # fmt: skip
 
@@ -40,22 +40,24 @@ def test_one_site_may_name_a_lump(search):
     assert search.passes(score("inclusion", alone))
 
 
-def test_evidence_alone_does_not_name_what_closes_nothing(search):
-    """A law that misses by little misses everywhere: evidence grows with the force over the noise."""
+def test_what_is_there_is_named_however_little_it_closes_but_not_if_places_grow_worse(search):
     everywhere = [12.0, 8.0, 20.0, 16.0] * 10
-    assert search.passes(score("strain_stiffening", everywhere))
-    assert not search.passes(score("strain_stiffening", everywhere, closes=0.0))
-    assert not search.passes(score("strain_stiffening", [1e3 * gain for gain in everywhere], closes=-0.5))
+    assert search.passes(score("strain_stiffening", everywhere, share=0.01))
+    assert not search.passes(score("strain_stiffening", [1e3 * gain for gain in everywhere], share=-0.5))
 
 
 def test_a_closed_gap_without_evidence_names_nothing(search):
-    assert not search.passes(score("compliant_base", [0.2] * 40, closes=0.7))
+    assert not search.passes(score("compliant_base", [0.1] * 40))
 
 
-def test_probabilities_grow_with_evidence_and_closure():
-    few, many = score("time_delay", [2.0] * 40), score("time_delay", [20.0] * 40)
+def test_probabilities_grow_with_evidence():
+    few, many = score("time_delay", [0.5] * 40), score("time_delay", [20.0] * 40)
     assert 0 < few.probability < many.probability < 1
-    assert score("time_delay", [2.0] * 40, closes=0.2).probability < few.probability
+
+
+def test_a_lump_that_one_place_alone_speaks_for_is_known_as_such():
+    assert score("inclusion", [20.0] + [-0.1] * 39).by_one_place
+    assert not score("inclusion", [20.0, 5.0] + [-0.1] * 38).by_one_place
 
 
 def test_a_gap_smaller_than_what_matters_is_not_closed_by_less():
@@ -86,11 +88,10 @@ def test_one_loud_site_does_not_decide_on_finite_strain(search, loud, named):
         gram = np.zeros((24, 1, 1))
         gram[:, 0, 0] = 500.0 - (2 * quiet if effects else 0.0)
         plain = np.full(24, 0.9 if effects else 1.0)
-        return SimpleNamespace(chi=1.0, plain=plain, found=SimpleNamespace(gram=gram, loss=gram.sum() / 2))
+        return SimpleNamespace(over=1.0, plain=plain, found=SimpleNamespace(gram=gram, loss=gram.sum() / 2))
 
     search.judge = judged
     search.finite_strain = effect("finite_strain")
-    search.forward = SimpleNamespace(touches=SimpleNamespace(noise=SimpleNamespace(variance_inflation=1.0)))
     _, gain, closes = _with_strain(search, [])
     assert closes == pytest.approx(2.4)
     assert (gain > AttributionOptions().beyond_doubt) == named

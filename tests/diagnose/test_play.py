@@ -119,5 +119,5 @@ def test_what_a_play_leaves_open_counts_less(bench):
     without = Whitener(forward, settings_of(forward, [], fit.values, fit.onset), NuisanceOptions())
     still = forward.unsure.mean(axis=1) > 0.4
     assert (with_play.louder >= without.louder * 0.9).all()
-    assert with_play.louder[still].mean() > 2 * without.louder[still].mean()
+    assert with_play.louder[still].mean() > 1.5 * without.louder[still].mean()
     assert (with_play.volume > without.volume).all()

@@ -53,7 +53,7 @@ def test_the_interval_holds_the_truth_and_is_narrow(late):
 def test_fewer_sites_tell_less(late):
     search, _, found = late
     few = found.__class__(**{**found.__dict__, "gram": found.gram[::4]})
-    whole, part = (covariance(f, 1.0, d)[1, 1] for f, d in ((found, search.dof), (few, search.dof / 4)))
+    whole, part = (covariance(f, d)[1, 1] for f, d in ((found, search.dof), (few, search.dof / 4)))
     assert part > 2 * whole
 
 
@@ -61,7 +61,7 @@ def test_what_no_noise_tells_is_added(late):
     search, _, found = late
     rng = np.random.default_rng(0)
     low, high = parameter_intervals(found, "time_delay", search.forward, search.dof, rng)["delay_s"]
-    formal = np.sqrt(covariance(found, 1.0, search.dof)[1, 1])
+    formal = np.sqrt(covariance(found, search.dof)[1, 1])
     expected = 2 * 1.96 * np.hypot(formal, DELAY.hints.systematic[0])
     assert high - low == pytest.approx(expected, rel=0.2)
 
@@ -69,14 +69,18 @@ def test_what_no_noise_tells_is_added(late):
 def test_what_one_place_alone_speaks_for_closes_nothing(late):
     """The other places would not have added it, so they do not predict it: as a lump under one place."""
     search, plain, _ = late
-    old = JudgedSet(plain, 0.5 * plain.gram[:, 0, 0], plain.raw[:, 0, 0].copy(), search.dof)
+    old = JudgedSet(
+        plain, 0.5 * plain.gram[:, 0, 0], plain.raw[:, 0, 0].copy(), plain.gram[:, 0, 0], search.dof, 1.0
+    )
 
     def better_at(sites) -> Score:
         gram, lower = plain.gram.copy(), old.plain.copy()
         gram[sites, 0, 0] *= 0.2
         lower[sites] *= 0.2
         found = dataclasses.replace(plain, gram=gram)
-        return search.score([DELAY], JudgedSet(found, 0.5 * gram[:, 0, 0], lower, search.dof), old)
+        return search.score(
+            [DELAY], JudgedSet(found, 0.5 * gram[:, 0, 0], lower, gram[:, 0, 0], search.dof, 1.0), old
+        )
 
     assert better_at([1]).share == better_at([1]).gain == 0.0
     assert better_at([1, 3, 5]).share > 0.05
