@@ -115,9 +115,6 @@ def material_of_few(
     tip = tests.tip
     assert tip is not None
     ways = _ways(tests, bench)
-    slopes = [w.slope_n_per_m for w in ways if w.slope_n_per_m]
-    if slopes:
-        notes.append(f"free air slopes by {np.median(slopes):.3g} N/m of travel, which is taken off")
     machine: Machine | None = None
     nu = bench.model.material.poisson_ratio
     if tip.form == "punch":
