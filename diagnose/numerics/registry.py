@@ -12,6 +12,7 @@ NAMES = (
     "contact_nodes",
     "contact_offset",
     "mesh_stiffness",
+    "force_law",
     "numerical_damping",
     "time_step",
     "lost_contact",

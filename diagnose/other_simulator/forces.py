@@ -8,12 +8,13 @@ interpolated or left out is said (`Aligned.notes`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
+from palpate.diagnosis.other_simulator.frame import UNITS, Frame, weighed_frame
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.options import option
@@ -41,7 +42,6 @@ LONGEST_GAP_S = 0.03
 """Without rows in a press, over which nothing is interpolated: the press is left out."""
 AGAINST, LAG_S, BETTER = -0.3, 0.15, 0.1
 """Cosine from which forces point the wrong way; lag that no delay makes; by how much it must fit better."""
-OTHER_UNIT = 30.0
 _GRID_S = 0.02
 _MOST_LAG_S = 60.0
 
@@ -62,6 +62,13 @@ class ForcesOptions:
         low=-1e10,
         high=1e10,
     )
+    simulated_axes: str = option(
+        "",
+        "which of the recording's axes the file's fx, fy, fz are: x,z,-y where it has y up; default: weighed",
+    )
+    simulated_unit: str | None = option(
+        None, "of the simulated forces; default: weighed, newtons first", choices=UNITS
+    )
 
 
 @dataclass(frozen=True)
@@ -78,11 +85,13 @@ class Forces:
 
 @dataclass(frozen=True)
 class Aligned:
-    """force: (n, 3) N on the tool at the rows of the presses. usable: (p,) bool. notes: in words."""
+    """force: (n, 3) N on the tool at the rows of the presses. usable: (p,) bool. notes: in words. frame: how
+    the file writes them."""
 
     force: np.ndarray
     usable: np.ndarray
     notes: tuple[str, ...]
+    frame: Frame = field(default_factory=Frame)
 
 
 def read_forces(path: Path | str) -> Forces:
@@ -120,10 +129,11 @@ def sorted_forces(t: np.ndarray, force: np.ndarray, name: str) -> Forces:
     return Forces(t[new], force[new], name, tuple(notes))
 
 
-def aligned(given: Forces, presses: Presses, options: ForcesOptions) -> Aligned:
+def aligned(given: Forces, presses: Presses, options: ForcesOptions, level: float = 1.0) -> Aligned:
     """The forces at the presses' rows, on the tool, by straight lines between samples.
 
-    Raises OptionError where they are of another time, point the other way, or fit another clock far better.
+    level: how much stiffer than the model the simulation was stated to be. Raises OptionError where they are
+    of another time, point the other way, fit another clock far better, or may be in another frame or unit.
     """
     notes = list(given.notes)
     t = given.t + (options.clock_offset_s or 0.0)
@@ -133,8 +143,16 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions) -> Aligned:
         _same_clock(t, force, presses)
     at = np.column_stack([np.interp(presses.t, t, f, left=0.0, right=0.0) for f in force.T])
     rows = presses.counted if given.chosen is None else presses.counted & given.chosen[presses.press]
+    if not (at[rows] ** 2).any():
+        raise OptionError(
+            "the simulated forces are zero wherever the recording touches: is it the same path?"
+        )
+    frame = weighed_frame(
+        at, presses, rows, axes=options.simulated_axes, unit=options.simulated_unit, level=level
+    )
+    notes += frame.notes
+    at = frame.newtons(at)
     _same_direction(at, presses, rows)
-    _of_newtons(at, presses, rows, notes)
     step, own = float(np.median(np.diff(t))), 1.0 / presses.sample_rate_hz
     if abs(step / own - 1) > 0.05:
         notes.append(
@@ -147,7 +165,7 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions) -> Aligned:
             f"{(run & ~usable).sum()} of {run.sum()} presses were left out: rows are missing for over "
             f"{1e3 * LONGEST_GAP_S:g} ms"
         )
-    return Aligned(at, usable, tuple(notes))
+    return Aligned(at, usable, tuple(notes), frame)
 
 
 def _same_time(t: np.ndarray, presses: Presses) -> None:
@@ -197,19 +215,6 @@ def _same_direction(at: np.ndarray, presses: Presses, rows: np.ndarray) -> None:
         raise OptionError(
             f"the simulated forces point against the measured ones (cosine {cosine:.2f}): is it the force on "
             "the object? State --simulated-force-on object"
-        )
-
-
-def _of_newtons(at: np.ndarray, presses: Presses, rows: np.ndarray, notes: list[str]) -> None:
-    measured = np.sqrt((presses.force[rows] ** 2).sum(axis=1).mean())
-    size = np.sqrt((at[rows] ** 2).sum(axis=1).mean())
-    if not size > 0:
-        raise OptionError(
-            "the simulated forces are zero wherever the recording touches: is it the same path?"
-        )
-    if not 1 / OTHER_UNIT < size / measured < OTHER_UNIT:
-        notes.append(
-            f"the simulated forces are {size / measured:.3g} times the measured ones: are they in newtons?"
         )
 
 

@@ -12,6 +12,7 @@ from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.other_simulator.against_law import LEAST_SHARE, Numerics, numerics_of, seen_in_samples
 from palpate.diagnosis.other_simulator.declared_parameters import Stated, StatedForward
 from palpate.diagnosis.other_simulator.forces import Aligned
+from palpate.diagnosis.other_simulator.frame import Frame
 from palpate.diagnosis.other_simulator.gap_decomposition import law_at
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.mechanics.presses.table import MARGIN_S, Presses
@@ -22,7 +23,8 @@ from palpate.mechanics.progress import Progress
 class Sides:
     """The simulation's presses beside the real ones. forward: of all its presses, with the mended signal;
     raw: (n, 3) N, local, the force as it came; rows: of the real touches; fell_s: (p,) s, from when on the
-    tip had fallen through, inf where it did not; seen: what the samples themselves showed."""
+    tip had fallen through, inf where it did not; seen: what the samples themselves showed; frame: how
+    the file writes its forces."""
 
     forward: StatedForward
     raw: np.ndarray
@@ -30,6 +32,7 @@ class Sides:
     fell_s: np.ndarray
     seen: dict[str, dict[str, float]]
     notes: tuple[str, ...]
+    frame: Frame = dataclasses.field(default_factory=Frame)
 
 
 def pair_forces(given: Aligned, findings: Findings, stated: Stated) -> Sides:
@@ -54,7 +57,7 @@ def pair_forces(given: Aligned, findings: Findings, stated: Stated) -> Sides:
     forward = StatedForward(mended, real.places, stated, exact=real.exact).of(keep)
     fell_s = fell_s[np.searchsorted(presses.onset_s, forward.touches.onset_s)]
     keys = {name: values for name, (_, values) in seen.items()}
-    return Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes)
+    return Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes, given.frame)
 
 
 def named_numerics(sides: Sides, rules: AttributionOptions, progress: Progress) -> Numerics:

@@ -78,7 +78,8 @@ def diagnose_simulated(
     presses = presses_on(recording, model)
     if presses.quasi_static:
         raise DiagnosisError("points without a time are not a path that a simulator can follow")
-    given = aligned(asked.forces, presses, asked.options)
+    level = asked.stated.young_modulus_pa / model.material.young_modulus_pa
+    given = aligned(asked.forces, presses, asked.options, level)
     if reality is None:
         reality = diagnose(
             recording, model, options, part(progress, 0.0, 0.6), nuisance=nuisance, attribution=attribution
@@ -174,7 +175,9 @@ def _concluded(w: _Weighed) -> SimulatedGap:
     kept = np.isin(forward.touches.onset_s, w.sides.forward.touches.onset_s)
     forward.touches = forward.touches.of(kept)
     return SimulatedGap(
-        simulator=Simulator(w.asked.forces.name, w.asked.version, w.asked.stated),
+        simulator=Simulator(
+            w.asked.forces.name, w.asked.version, w.asked.stated, w.sides.frame.axes, w.sides.frame.unit
+        ),
         noise_n=reality.noise_n,
         gap_before_n=math.sqrt(whole),
         gap_after_n=math.sqrt(max(after.sum() / counts.sum() + weighing.added, 0.0)),

@@ -15,6 +15,7 @@ import numpy as np
 from palpate.diagnosis.numerics.registry import numerical
 from palpate.diagnosis.other_simulator.against_law import Numerics
 from palpate.diagnosis.other_simulator.declared_parameters import Stated
+from palpate.diagnosis.other_simulator.frame import AS_RECORDED
 from palpate.diagnosis.other_simulator.gap_decomposition import StatedParameter
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry, answers_json
 from palpate.diagnosis.verdict.where import Where
@@ -78,11 +79,14 @@ PARTS = ("numerics", "parameters", "reality")
 
 @dataclass(frozen=True)
 class Simulator:
-    """Whose forces they are. version: "" where it is not known."""
+    """Whose forces they are. version: "" where it is not known. axes, unit: of its file
+    (`other_simulator.frame`)."""
 
     name: str
     version: str
     stated: Stated
+    axes: str = AS_RECORDED
+    unit: str = "N"
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys; `given`: which of `stated` were said, the others are the model's."""
@@ -91,6 +95,8 @@ class Simulator:
             "version": self.version,
             "stated": self.stated.as_json(),
             "given": sorted(self.stated.given),
+            "frame": self.axes,
+            "unit": self.unit,
         }
 
 

@@ -21,6 +21,7 @@ from palpate.diagnosis.specimen.machine_compliance import (
     rigid_interval,
     way_of,
 )
+from palpate.diagnosis.specimen.pulled import jkr_modulus
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL
@@ -115,9 +116,6 @@ def material_of_few(
     tip = tests.tip
     assert tip is not None
     ways = _ways(tests, bench)
-    slopes = [w.slope_n_per_m for w in ways if w.slope_n_per_m]
-    if slopes:
-        notes.append(f"free air slopes by {np.median(slopes):.3g} N/m of travel, which is taken off")
     machine: Machine | None = None
     nu = bench.model.material.poisson_ratio
     if tip.form == "punch":
@@ -129,6 +127,14 @@ def material_of_few(
         notes.append(_LOOP)
     limit = _ALIKE * approach.error[approach.law]
     likely = [approach.law, *(n for n in tip.laws if n != approach.law and approach.error[n] <= limit)]
+    interval = _both(float(own.mean()), own, rigid_interval(ways, nu, tip, float(own.mean()), likely))
+    if pull > 0 and tip.radius_m is not None and tip.form == "sphere":
+        sticky = jkr_modulus(ways, tip.radius_m, nu, pull, float(own.mean()))
+        ends = as_read(sticky, (sticky, sticky))
+        interval = min(interval[0], ends[0]), max(interval[1], ends[1])
+        notes.append(
+            f"with that pull by JKR the modulus would be {sticky:.4g} Pa: the interval reaches there"
+        )
     onset = {"onset_m": bench.onset_m[bench.used].tolist()}
     common = Material(
         kind="indentation",
@@ -138,11 +144,7 @@ def material_of_few(
         young_modulus_pa=float(own.mean()),
         young_modulus_ci95_pa=_with_loop(
             lost,
-            _both(
-                float(own.mean()),
-                own,
-                rigid_interval(ways, nu, tip, float(own.mean()), likely),
-            ),
+            interval,
         ),
         law=approach.law,
         error=approach.error,

@@ -1,4 +1,4 @@
-"""What a few curves tell of the machine beside the material: how far it yields, how free air slopes.
+"""What a few curves tell of the machine beside the material: how far it yields.
 
 A machine of stiffness K adds F / K to the travel, u = u0 + d(F / E) + F / K, where d is the depth at which
 the law gives F. For each E the rest is linear, so one search over E fits all curves at once, each with
@@ -30,20 +30,17 @@ ALL = 0.95
 """A machine that takes this share of the travel in contact leaves too little to tell a modulus by: the dent
 is then no greater than what law, zero and tip are known by."""
 _DECADES, _TIMES = 2.0, 2.0
-_SLOPE_SURE, _SLOPE_MATTERS = 4.0, 0.01
 
 
 @dataclass(frozen=True)
 class Way:
-    """One way in, thinned to even steps of force: travel (n,) m from any zero, push (n,) N over free air's
-    level and slope. slope_n_per_m: of free air, taken off (0: none shown)."""
+    """One way in, thinned to even steps of force: travel (n,) m from any zero, push (n,) N over free air."""
 
     travel: np.ndarray
     push: np.ndarray
-    slope_n_per_m: float = 0.0
 
     @classmethod
-    def thinned(cls, u: np.ndarray, net: np.ndarray, slope_n_per_m: float = 0.0) -> Way:
+    def thinned(cls, u: np.ndarray, net: np.ndarray) -> Way:
         """Of the rows (n,) m, (n,) N over free air that end at the peak."""
         top = float(net[-1])
         edges = np.linspace(_LOWEST * top, top, _POINTS + 1)
@@ -51,7 +48,7 @@ class Way:
         kept = np.unique(step[step >= 0])
         mean = [(float(u[step == k].mean()), float(net[step == k].mean())) for k in kept]
         thin_u, thin_f = (np.array(v) for v in zip(*mean, strict=True))
-        return cls(thin_u, thin_f, slope_n_per_m)
+        return cls(thin_u, thin_f)
 
 
 @dataclass(frozen=True)
@@ -77,18 +74,9 @@ def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> Way:
     peak = int(np.argmax(force))
     u, f = travel[: peak + 1], force[: peak + 1]
     air = u < onset - 0.03 * (u[-1] - onset)
-    slope = 0.0
-    level = float(np.median(f[air])) if air.any() else float(f[0])
-    if air.sum() >= 12 and np.ptp(u[air]) > 0:
-        (slope, at_zero), covariance = np.polyfit(u[air] - onset, f[air], 1, cov=True)
-        sure = abs(slope) > _SLOPE_SURE * np.sqrt(covariance[0, 0])
-        if sure and abs(slope) * (u[-1] - onset) > _SLOPE_MATTERS * (f[-1] - level):
-            level = at_zero
-        else:
-            slope = 0.0
-    net = f - level - slope * (u - onset)
+    net = f - (float(np.median(f[air])) if air.any() else float(f[0]))
     near = u > onset - 0.1 * (u[-1] - onset)
-    return Way.thinned(u[near], net[near], float(slope))
+    return Way.thinned(u[near], net[near])
 
 
 class _YieldingFit:

@@ -12,6 +12,7 @@ from scipy.stats import t as student
 
 from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.specimen.approach import approach_of
+from palpate.diagnosis.specimen.baseline import without_slope
 from palpate.diagnosis.specimen.bench import PEAK_N, Bench, MachineCycle, bench_of
 from palpate.diagnosis.specimen.bench_diagnosis import (
     diagnose_bench,
@@ -91,6 +92,11 @@ def material_of(
     def bench(curves: Sequence[MachineCycle]) -> Bench:
         return bench_of(curves, tip, layer_m=layer_m, poisson_ratio=nu, specimens=specimens)
 
+    air = without_slope(tests.curves, tip, timed=tests.timed)
+    if len(air.slope_n_per_m):
+        each = f"free air slopes by {np.median(air.slope_n_per_m):.3g} N/m of travel on the way in"
+        notes = (*tests.notes, f"{each}, which is taken off, with what it is known by in the interval")
+        tests = replace(tests, curves=tuple(air.curves), notes=notes)
     curves, words = late_contact(tests.curves, nu, tip)
     found = bench(curves)
     if words is not None:
@@ -102,7 +108,17 @@ def material_of(
         notes = (*tests.notes, f"{words}: the modulus would be {read[1]:.4g} Pa if it were not")
         tests = replace(tests, notes=notes)
     made = _indentation(tests, found, names, fast, seed, progress)
+    if len(air.slope_n_per_m):
+        off = np.log(bench(air.later).modulus_pa / found.modulus_pa)[found.used]
+        made = widened(made, 2 * float(np.sqrt(np.nansum(off**2))) / len(off))
     return replace(made, tip=tip, poisson_ratio=nu, poisson_from=source)
+
+
+def widened(made: Material, log_half: float) -> Material:
+    """With what else the logarithm of its modulus is known by, 95 %."""
+    e = made.young_modulus_pa
+    low, high = (np.hypot(np.log(end / e), log_half) for end in made.young_modulus_ci95_pa)
+    return replace(made, young_modulus_ci95_pa=(e * float(np.exp(-low)), e * float(np.exp(high))))
 
 
 def _poisson_of(stated: float | None, tests: MachineTests) -> tuple[float, str]:

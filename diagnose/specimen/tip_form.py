@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from palpate.diagnosis.specimen.baseline import without_slope
 from palpate.diagnosis.specimen.bench import MachineCycle, touched
 from palpate.diagnosis.specimen.machine_compliance import BLOCKS, held_out_laws, way_of
 from palpate.mechanics.contact.tip import Tip
@@ -37,6 +38,7 @@ def form_scores(curves: Sequence[MachineCycle], radius_m: float, poisson_ratio: 
 def _score(curves: Sequence[MachineCycle], tip: Tip, poisson_ratio: float) -> float:
     """Nats of the blocks of force that the form misses; a sphere's by the best of its laws, on a rigid
     machine or one that yields. Machines take any share of the travel alike: the more of it, the fewer do."""
+    curves = without_slope(curves, tip, timed=False).curves
     found = touched(curves, tip)
     used = [c for c, u in zip(curves, found.used, strict=True) if u]
     ways = [way_of(c.travel, c.force, float(at)) for c, at in zip(used, found.onset, strict=True)]

@@ -266,6 +266,7 @@ def _simulations(
 
     from palpate.diagnosis.other_simulator.declared_parameters import stated_of, stated_values
     from palpate.diagnosis.other_simulator.forces import Forces
+    from palpate.diagnosis.other_simulator.frame import AS_RECORDED
     from palpate.diagnosis.other_simulator.pipeline import Asked
 
     most = presses or fewest(made)
@@ -288,7 +289,8 @@ def _simulations(
         # what the adapter gave it, but for what is said
         stated = stated_of({**ran.adapter.stated, **stated_values(given)}, each.model)
         of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
-        simulations.append(Asked(forces, stated, replace(of_forces, clock_offset_s=0.0), *of_adapter))
+        plain = replace(of_forces, clock_offset_s=0.0, simulated_axes=AS_RECORDED, simulated_unit="N")
+        simulations.append(Asked(forces, stated, plain, *of_adapter))
     return simulations
 
 

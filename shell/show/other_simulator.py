@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.numerics.registry import NAMES, numerical
+from palpate.diagnosis.other_simulator.frame import AS_RECORDED
 from palpate.diagnosis.other_simulator.result import PARTS, SimulatedGap
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
 from palpate.mechanics.effects.base import Effect
@@ -163,6 +164,9 @@ def story(result: SimulatedGap) -> say.Story:
     )
     yield say.Headline(f"verdict: {verdict(result)}", on=say.TEXT)
     yield say.Headline(lead(result), on=say.PAGE)
+    read_as = result.simulator.axes, result.simulator.unit
+    if read_as != (AS_RECORDED, "N"):
+        yield say.Sentence(f"its forces are read as {' in '.join(read_as)}, not x,y,z in N (see the notes)")
     yield say.Next(result.advice, on=say.PAGE)
     yield from _parts(result)
     if result.mended is not None:

@@ -36,6 +36,7 @@ from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import LEAD_S
 from palpate.mechanics.progress import silent
+from palpate.mechanics.quantities import parse_unit
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.registry import create
 from palpate.render.replay import replay
@@ -317,6 +318,69 @@ def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):
         aligned(Forces(t + 1.0, force, "x"), presses, ForcesOptions())
     with pytest.raises(OptionError, match="zero wherever"):
         aligned(Forces(t, 0 * force, "x"), presses, ForcesOptions())
+
+
+def test_forces_in_another_frame_or_unit_are_taken_where_they_show_it_and_say_so(world):
+    recording, model, _, force, _ = world
+    presses, t = model.presses, recording.t
+    plain = aligned(Forces(t, force, "x"), presses, OWN_CLOCK)
+    assert (plain.frame.axes, plain.frame.unit, plain.frame.notes) == ("x,y,z", "N", ())
+    y_up = force[:, [0, 2, 1]] * [1, 1, -1]
+    for came, axes, unit in (
+        (y_up, "x,z,-y", "N"),
+        (force[:, [0, 2, 1]], "x,z,y", "N"),  # left-handed
+        (1e3 * force, "x,y,z", "mN"),
+        (1e-3 * y_up, "x,z,-y", "kN"),
+    ):
+        found = aligned(Forces(t, came, "x"), presses, OWN_CLOCK)
+        assert (found.frame.axes, found.frame.unit) == (axes, unit) and found.frame.notes
+        assert found.force == pytest.approx(plain.force)
+    # as stated, nothing is weighed
+    kept = dataclasses.replace(OWN_CLOCK, simulated_axes="x,y,z", simulated_unit="N")
+    assert aligned(Forces(t, 1e3 * force, "x"), presses, kept).force == pytest.approx(1e3 * plain.force)
+    with pytest.raises(OptionError, match="--simulated-axes 'x,z'"):
+        aligned(Forces(t, force, "x"), presses, dataclasses.replace(kept, simulated_axes="x,z"))
+
+
+@pytest.mark.parametrize("unit", ["kgf", "lbf"])
+def test_a_force_that_may_be_in_another_unit_is_asked_and_the_cure_works(world, unit):
+    """A simulation may be ten times too soft."""
+    recording, model, _, force, _ = world
+    few = Forces(recording.t, force / parse_unit(unit).scale, "x")
+    with pytest.raises(OptionError, match=f"--simulated-unit {unit}"):
+        aligned(few, model.presses, OWN_CLOCK)
+    cured = aligned(few, model.presses, dataclasses.replace(OWN_CLOCK, simulated_unit=unit))
+    assert cured.force == pytest.approx(
+        aligned(Forces(recording.t, force, "x"), model.presses, OWN_CLOCK).force
+    )
+    # a modulus stated as so much softer accounts for it
+    softer = aligned(few, model.presses, OWN_CLOCK, 1 / parse_unit(unit).scale)
+    assert softer.frame.unit == "N"
+
+
+def test_a_frame_that_the_presses_leave_open_is_asked_and_the_cure_works(world):
+    """All presses from above: how the other two axes lie nobody can tell."""
+    recording, model, _, force, _ = world
+    presses = model.presses
+    top = presses.of(presses.normal[:, 2] > 0.9)
+    assert len(top) >= 3
+    up = Forces(recording.t, np.outer(force[:, 2], [0, 1, 0]), "x")
+    with pytest.raises(OptionError, match="--simulated-axes"):
+        aligned(up, top, OWN_CLOCK)
+    cured = aligned(up, top, dataclasses.replace(OWN_CLOCK, simulated_axes="x,z,-y"))
+    assert cured.force[:, 2].max() > 0 and not cured.force[:, :2].any()
+
+
+@pytest.mark.parametrize("power", [2.0, 1.0])
+def test_a_force_of_another_power_of_the_depth_is_one_effect(world, power):
+    force = world[3]
+    size = np.linalg.norm(force, axis=1, keepdims=True)
+    share = np.maximum(size / np.percentile(size[size > 0.05], 95), 1e-9)
+    result = judged(world, force * share ** (power / 1.5 - 1))
+    assert result.effects == ("force_law",)
+    found = next(e for e in result.entries if e.name == "force_law")
+    assert found.parameters["power"] == pytest.approx(power, rel=0.05)
+    assert result.unexplained < result.noise_share + 0.05
 
 
 def test_missing_rows_and_another_rate_are_told(world):
