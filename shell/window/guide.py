@@ -22,6 +22,7 @@ from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Sugge
 from palpate.diagnosis.explore.segments import Segment
 from palpate.mechanics.model.model import Model
 from palpate.servo import Servo
+from palpate.show.colours import COLOURS
 from palpate.window.picture import arrow_matrix
 from palpate.window.worker import Worker, level
 from palpate.words import kpa, mm
@@ -36,7 +37,7 @@ class Ghost:
     depth_m: float
 
 
-COLOUR = "#1a9850"
+COLOUR = COLOURS["next-touch"]
 STAFF_M = 0.03
 """Of the staff along which the tip comes."""
 

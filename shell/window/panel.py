@@ -11,16 +11,16 @@ import numpy as np
 
 from palpate.render.registry import names
 from palpate.scenes.scene import Scene
+from palpate.show.colours import ACCENT, GREY, HINT, WARNING, colour_of
 from palpate.window.keys import KEYS, help_rows, shown
 from palpate.window.mouse_and_keys import Controlled, Controls
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
 from palpate.window.session import FRICTIONS, MODULUS_STEP
-from palpate.window.widgets import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
+from palpate.window.widgets import BODY, Item, Row
 from palpate.window.worker import Frame
 from palpate.words import begun, mm, spaced
 
 T = TypeVar("T")
-WARNING = "#b3261e"
 DRAGGED_M = 0.006
 DEPTH = "press depth"
 """The slider's name."""
@@ -94,11 +94,11 @@ def main_rows(window: Shown, frame: Frame) -> list[Row]:
     rows: list[Row] = [
         (Item(window.scene.title, size=16, bold=True),),
         (Item(about, size=12, colour=GREY),),
-        (Item(f"{np.linalg.norm(felt.force_n):.2f} N", size=46, bold=True, colour=ACCENT),),
+        (Item(f"{np.linalg.norm(felt.force_n):.2f} N", size=46, bold=True, colour=colour_of(felt.name)),),
     ]
     # its row is there without it too: no button moves away from under the mouse
     second = "".join(f"{np.linalg.norm(v.force_n):.2f} N  {v.name}" for v in others)
-    rows.append((Item(second, size=17, bold=True, colour=SECOND),))
+    rows.append((Item(second, size=17, bold=True, colour=colour_of(others[0].name) if others else GREY),))
     rows += [
         (Item(_where(frame), size=12, colour=GREY),),
         (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=2),),

@@ -15,10 +15,10 @@ from palpate.render.base import Renderer
 from palpate.render.press import BESIDE
 from palpate.render.support import support_plane
 from palpate.scenes.phantoms import Region
+from palpate.show.colours import COLOURS, INK, colour_of
 from palpate.window import shadow
 from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
-from palpate.window.widgets import INK
 from palpate.window.worker import Frame, RendererView
 from palpate.words import mm
 
@@ -27,7 +27,6 @@ LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 SPREAD = 2
-TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
 
 Colours = Literal["viridis", "YlOrRd"]
 
@@ -65,17 +64,18 @@ class ObjectPicture:
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
             smooth_shading=True,
-            color=TIP_COLOUR,
+            color=COLOURS["tip"],
             ambient=0.35,
             specular=0.4,
         )
         self._arrow = plotter.add_mesh(
-            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR, ambient=0.6
+            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08),
+            ambient=0.6,
         )
         self._ball = plotter.add_mesh(
             pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20),
             smooth_shading=True,
-            color=INCLUSION_COLOUR,
+            color=COLOURS["inclusion"],
         )
         self._ball.SetVisibility(False)
         self._inside: Region | None = None
@@ -86,6 +86,10 @@ class ObjectPicture:
         )
         self._shadow.SetVisibility(False)
         self.colour_by_displacement()
+
+    def is_of(self, name: str) -> None:
+        """Whose force the arrow is: it has that renderer's colour."""
+        self._arrow.prop.color = colour_of(name)
 
     @property
     def rest_surface(self) -> tuple[np.ndarray, np.ndarray]:

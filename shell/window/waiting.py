@@ -17,12 +17,12 @@ from palpate.mechanics.recording.recording import read_recording
 from palpate.scenes.embedded import embedded_recording
 from palpate.scenes.phantoms import phantom
 from palpate.scenes.scene import Scene
-from palpate.window.widgets import GREY, HINT, PAPER, Board, Item
+from palpate.show.colours import COLOURS, GREY, HINT, PAPER, STAGE
+from palpate.window.widgets import Board, Item
 
 T = TypeVar("T")
 PERIOD_S = 0.05
 SIZE = (1280, 800)
-BACKGROUND, OBJECT = "#f4f6f8", "#d9b96a"
 COLUMNS = 3
 SPACE, HEAD, PICTURE = 16, 76, 250
 """Between cards, above them, and the height of a card's picture, pixels of a window of full size."""
@@ -72,7 +72,7 @@ class WaitingWindow:
             title="Palpate",
         )
         base, *self._views = self.plotter.renderers
-        base.set_background(BACKGROUND)
+        base.set_background(STAGE)
         base.viewport = (0.0, 0.0, 1.0, 1.0)
         self.head = Board(base)
         self.cards = [Board(base, fill=PAPER) for _ in scenes]
@@ -204,9 +204,11 @@ def _draw(plotter: pyvista.Plotter, scene: Scene) -> None:
     if scene.kind == "phantom":
         shape = phantom(scene.source)
         surface = pyvista.PolyData.from_regular_faces(shape.vertices, shape.faces)
-        plotter.add_mesh(surface, color=OBJECT, smooth_shading=True, split_sharp_edges=True, ambient=0.2)
+        plotter.add_mesh(
+            surface, color=COLOURS["object"], smooth_shading=True, split_sharp_edges=True, ambient=0.2
+        )
     else:
         path = read_recording(embedded_recording(scene.source)).position[::EVERY]
-        plotter.add_points(path, color=OBJECT, point_size=2.0)
+        plotter.add_points(path, color=COLOURS["object"], point_size=2.0)
     plotter.camera_position = "xz"
     plotter.camera.elevation = 30.0

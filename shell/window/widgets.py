@@ -21,10 +21,9 @@ from vtkmodules.vtkRenderingCore import (
     vtkTextActor,
 )
 
+from palpate.show.colours import ACCENT, BUTTON, INK, NIGHT, OVER, PAPER
 from palpate.window.lettering import cut, set_type, text_width, wrapped
 
-INK, GREY, ACCENT, SECOND = "#1c2430", "#667080", "#1b4f9c", "#d98c00"
-PAPER, BUTTON, OVER, HINT, NIGHT = "#ffffff", "#e9edf3", "#d3dded", "#e8f0fb", "#2b3442"
 BODY = 13
 """Size of type in pixels, of a window of full size."""
 MARGIN, GAP, BUTTON_HEIGHT, SLIDER_HEIGHT, LINE = 14, 6, 30, 20, 1.32

@@ -20,6 +20,7 @@ from palpate.devices.channel import PoseChannel
 from palpate.mechanics.disk.writing import PNG, atomic_file
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene
+from palpate.show.colours import PAPER, STAGE
 from palpate.window.charts import AxesGizmo, LiveCharts
 from palpate.window.game import PRESS_M, Game
 from palpate.window.guide import GhostTip
@@ -30,7 +31,7 @@ from palpate.window.picture import ObjectPicture
 from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
-from palpate.window.widgets import PAPER, Board, Item
+from palpate.window.widgets import Board, Item
 from palpate.window.worker import Frame, Pace, RendererView, level
 
 if TYPE_CHECKING:
@@ -41,7 +42,6 @@ SIZE = (1280, 800)
 COLUMN, CHARTS = 280, 190
 """Width of the columns beside the pictures and height of the plots, pixels of a window of full size."""
 LEAST_SCALE, MOST_SCALE = 0.55, 2.5
-BACKGROUND = "#f4f6f8"
 LIGHTS = (((-0.4, 0.55, 1.0), 0.9), ((0.9, -0.1, 0.6), 0.45))
 """Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
 
@@ -113,7 +113,7 @@ class TouchWindow:
             lighting="none",
         )
         for renderer in plotter.renderers:
-            renderer.set_background(BACKGROUND)
+            renderer.set_background(STAGE)
             # blending in any order takes several passes over the whole picture; a shadow needs one
             renderer.UseOITOff()
         # smoothing edges costs more than all the rest where there is no graphics card
@@ -166,7 +166,9 @@ class TouchWindow:
         if self.coloured:
             self._map.forget()
         self._names = names
-        self._charts.tell(len(names))
+        self._charts.tell(names)
+        for picture, name in zip(self.pictures, names, strict=False):
+            picture.is_of(name)
 
     def _lay_out(self) -> None:
         """Everything in its place, where the window, or what is open in it, has changed."""

@@ -8,8 +8,8 @@ import pytest
 
 from palpate.mechanics.errors import SceneError
 from palpate.scenes.scene import load_scene
+from palpate.show.colours import HINT, PAPER
 from palpate.window.waiting import ClosedError, WaitingWindow
-from palpate.window.widgets import HINT, PAPER
 
 from ...support.waiting import PATIENCE_S
 

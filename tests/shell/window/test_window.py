@@ -20,6 +20,7 @@ from palpate.mechanics.recording.recording import read_recording
 from palpate.operations.touch import ServoRun
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene, load_scene
+from palpate.show.colours import COLOURS
 from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
 from palpate.window.panel import DEPTH
@@ -94,8 +95,8 @@ def test_the_picture_shows_tip_arrow_and_plot(driven: Driven) -> None:
     def like(colour: tuple[int, int, int]) -> int:
         return int((np.abs(driven.picture().astype(int) - colour).sum(axis=2) < 90).sum())
 
-    arrow = (27, 79, 156)
-    before, hovering = like(arrow), like((217, 95, 2))
+    arrow, tip = (pyvista.Color(COLOURS[thing]).int_rgb for thing in ("fem", "tip"))
+    before, hovering = like(arrow), like(tip)
     press(driven)
     driven.until(lambda f: like(arrow) > before + 30)  # an arrow appears
     assert hovering > 50, "the tip is drawn"
