@@ -68,6 +68,20 @@ def counted(number: int, thing: str) -> str:
     return f"{number} {thing}{'s' * (number != 1)}"
 
 
+_RENDERERS = {
+    "fem": "this model",
+    "kelvin-voigt": "spring and damper",
+    "hunt-crossley": "stiffening spring",
+    "hunt-crossley-undamped": "stiffening spring, no damper",
+    "hunt-crossley-kh": "stiffening spring, one power",
+}
+
+
+def renderer_words(name: str) -> str:
+    """A renderer as a person who knows none calls it; another simulator by its name."""
+    return _RENDERERS.get(name, name)
+
+
 def signed(words: str, value: Any) -> tuple[str, int]:
     """(words, 1), or where words say how late something is and the value is below 0, ('... early by', -1)."""
     early = isinstance(value, int | float) and value < 0 and " late " in f" {words} "

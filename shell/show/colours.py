@@ -21,6 +21,7 @@ COLOURS = {
     "base": "#51657d",
     "tip": "#8f9aa8",
     "inclusion": "#7b1fa2",
+    "displaced": "#a61c1c",
     "touch": "#c1121f",
     "peak": "#a3386c",
     "path": "#b8c0cc",

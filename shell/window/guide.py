@@ -85,7 +85,9 @@ class BaseTracing:
         self._middle = base.mean(axis=0)
         up = model.support.normal
         self._axes = np.column_stack([level(up), np.cross(up, level(up))])
-        self._foot = cKDTree((_outline(model) - self._middle) @ self._axes)
+        self._points = _outline(model)
+        flat = (self._points - self._middle) @ self._axes
+        self._foot, self._sector = cKDTree(flat), _sector(flat)
         self._seen = np.zeros(SECTORS, dtype=bool)
         self.first: int | None = None
         self.last: int | None = None
@@ -102,10 +104,14 @@ class BaseTracing:
         at_foot, away = low[near], away[near]
         if not len(at_foot):
             return
-        sector = (np.arctan2(away[:, 1], away[:, 0]) / (2 * np.pi) * SECTORS).astype(int) % SECTORS
-        self._seen[sector] = True
+        self._seen[_sector(away)] = True
         self.first = int(numbers[at_foot[0]]) if self.first is None else self.first
         self.last = int(numbers[at_foot[-1]])
+
+    @property
+    def foot(self) -> tuple[np.ndarray, np.ndarray]:
+        """(k, 3) m, points along the foot, and (k,) whether the tip went past them."""
+        return self._points, self._seen[self._sector]
 
     @property
     def share(self) -> float:
@@ -116,6 +122,11 @@ class BaseTracing:
     def done(self) -> bool:
         """Enough to reconstruct the base from."""
         return self.share >= ENOUGH
+
+
+def _sector(flat: np.ndarray) -> np.ndarray:
+    """(n,) number of the direction in which (n, 2) lie."""
+    return (np.arctan2(flat[:, 1], flat[:, 0]) / (2 * np.pi) * SECTORS).astype(int) % SECTORS
 
 
 def _outline(model: Model) -> np.ndarray:
@@ -169,6 +180,7 @@ class Guide:
         self._last_touch: int | None = None
         self._suggestion: Suggestion = explorer.suggest()
         self._state: ExplorationState = explorer.state
+        self._touched = np.zeros((0, 3))
 
     @property
     def suggestion(self) -> Suggestion:
@@ -187,6 +199,16 @@ class Guide:
         if s.kind != "press" or s.point is None or s.normal is None:
             return None
         return Ghost(s.point + self._servo.tip_radius_m * s.normal, -s.normal, s.depth_m)
+
+    @property
+    def foot(self) -> tuple[np.ndarray, np.ndarray]:
+        """(k, 3) m, points along the foot, and (k,) whether they were gone round."""
+        return self._tracing.foot
+
+    @property
+    def touched(self) -> np.ndarray:
+        """(p, 3) m, where a press met the object, of those that were understood."""
+        return self._touched
 
     def follow(self) -> None:
         """Take over the servo's newest ticks; hand a segment over where one has ended."""
@@ -238,6 +260,8 @@ class Guide:
         self.explorer.bring_up_to_date()
         self.explorer.save(self._path)
         self._state, self._suggestion = self.explorer.state, self.explorer.suggest()
+        if (found := self.explorer.estimate.exploration) is not None:
+            self._touched = found.presses.point
         if self._suggestion.kind == "retrace":
             self._tracing = BaseTracing(self._model)
 
@@ -252,7 +276,7 @@ class Guide:
         return asked if self._still_tracing else "press"
 
     def lines(self) -> list[str]:
-        """For the panel: what to do, and what is known."""
+        """For the panel: what to do, in one sentence, and what is known."""
         s, state = self._suggestion, self._state
         why = state.trouble.split(" (")[0].split(":")[0]
         known = f"no shape yet: {why}" if why else "nothing is known yet"
@@ -264,7 +288,7 @@ class Guide:
             )
         what = WHAT.get(s.kind, "")
         if self._still_tracing:
-            what += f" ({100 * self._tracing.share:.0f} % traced)"
+            what += f" ({100 * self._tracing.share:.0f} % traced): the red part is missing"
         if s.kind == "press":
-            what = f"press at the ghost, {mm(s.depth_m, '.0f')} deep"
-        return [f"{what}: {s.why}", known]
+            what = f"press at the green ghost, {mm(s.depth_m, '.0f')} deep"
+        return [what, known]

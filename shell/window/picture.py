@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any
 
 import numpy as np
 import pyvista
@@ -28,7 +28,8 @@ SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 SPREAD = 2
 
-Colours = Literal["viridis", "YlOrRd"]
+FAR = [COLOURS["object"], COLOURS["fem"], COLOURS["displaced"]]
+"""Of displacement: where nothing moves the object has its own colour."""
 
 
 class ObjectPicture:
@@ -99,7 +100,7 @@ class ObjectPicture:
     def colour_by_displacement(self) -> None:
         """As far as each point has moved, mm."""
         self.by_stiffness = False
-        self._colour_by("displacement (mm)", "YlOrRd", DISPLACEMENT_RANGE_MM)
+        self._colour_by("displacement (mm)", _ramp(FAR), DISPLACEMENT_RANGE_MM)
 
     def colour_by_stiffness(
         self, stiffness_n_per_m: np.ndarray, limits: tuple[float, float], depth_m: float
@@ -111,7 +112,7 @@ class ObjectPicture:
         self._surface[name] = stiffness_n_per_m
         self._colour_by(name, "viridis", limits)
 
-    def _colour_by(self, name: str, colours: Colours, limits: tuple[float, float]) -> None:
+    def _colour_by(self, name: str, colours: Any, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
         opacity, culling = 1.0, "none"
         if self._actor is not None:
@@ -187,6 +188,13 @@ class ObjectPicture:
         if size > LEAST_ARROW_N:
             start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
             self._arrow.SetUserMatrix(arrow_matrix(start, force, ARROW_M_PER_N * size))
+
+
+def _ramp(stops: list[str]) -> Any:
+    """A map through these colours."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("displacement", stops)
 
 
 def _spread(normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -223,15 +223,18 @@ class Board:
         """Whether the pixel is on the board."""
         return _within(self._rectangle, x, y)
 
-    def _at(self, x: float, y: float) -> int | None:
+    def _at(self, x: float, y: float, *, told: bool = False) -> int | None:
+        """What can be pressed here; told: or says what it is."""
         found = (
-            k for k, (item, at) in enumerate(self.placed) if (item.do or item.slide) and _within(at, x, y)
+            k
+            for k, (item, at) in enumerate(self.placed)
+            if (item.do or item.slide or (told and item.tip)) and _within(at, x, y)
         )
         return next(found, None)
 
     def hover(self, x: float, y: float) -> None:
-        """The mouse is here: a button lights up and says what it does."""
-        over = self._at(x, y)
+        """The mouse is here: a button lights up and says what it does, words what they are called."""
+        over = self._at(x, y, told=True)
         if over != self._over:
             self._over = over
             self.show(self._rows)

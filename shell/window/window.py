@@ -25,6 +25,7 @@ from palpate.window.charts import AxesGizmo, LiveCharts
 from palpate.window.game import PRESS_M, Game
 from palpate.window.guide import GhostTip
 from palpate.window.keys import Orbit
+from palpate.window.known import KnownSoFar
 from palpate.window.mouse_and_keys import Controls
 from palpate.window.panel import NextStep, aside_rows, main_rows
 from palpate.window.picture import ObjectPicture
@@ -33,6 +34,7 @@ from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
 from palpate.window.widgets import Board, Item
 from palpate.window.worker import Frame, Pace, RendererView, level
+from palpate.words import begun, renderer_words
 
 if TYPE_CHECKING:
     from palpate.window.guide import Guide
@@ -70,6 +72,7 @@ class TouchWindow:
         self.frames = 0
         self.closed = self.another = self._ended = False
         self.notice = self.aside = ""
+        self.more = False
         self.moved_by_mouse = channel is not None
         self._channel = channel
         self._last_s = time.perf_counter()
@@ -78,7 +81,7 @@ class TouchWindow:
         self._map = StiffnessMap(session.worker, session.servo.tip_radius_m)
         nodules = tuple(session.model.material.inclusions.values())
         up = session.model.support.normal
-        self.game = Game(nodules, up) if scene.find and nodules else None
+        self.game = Game(nodules, up) if scene.find and nodules and guide is None else None
         self.coloured = scene.colour == "stiffness"
         self.plotter = self._plotter(off_screen, size)
         self._first, self._second, self._plots, self._column, self._aside = self.plotter.renderers
@@ -90,6 +93,7 @@ class TouchWindow:
         self._names: tuple[str, ...] = ()
         self.pictures = [self._picture(0, session.renderer_name)]
         self._ghost = GhostTip(self.plotter, session.servo.tip_radius_m) if guide else None
+        self._known = KnownSoFar(self.plotter)
         self._axes = AxesGizmo(self._first)
         self.plotter.subplot(0, 2)
         self._charts = LiveCharts(self.plotter, session.trace.seconds)
@@ -121,6 +125,11 @@ class TouchWindow:
         assert window is not None, "a plotter has one until it is closed"
         window.SetMultiSamples(0)
         return plotter
+
+    @property
+    def guided(self) -> bool:
+        """Whether an exploration is guided."""
+        return self.guide is not None
 
     @property
     def sides(self) -> int:
@@ -275,6 +284,7 @@ class TouchWindow:
         if self.guide is not None and self._ghost is not None:
             self.guide.follow()
             self._ghost.show(self.guide.ghost)
+            self._known.show(self.guide)
         self._axes.update(self._scale)
         if words:
             self._write(frame)
@@ -291,16 +301,21 @@ class TouchWindow:
         column.show(main_rows(self, frame))
         aside.show(aside_rows(self) if self.aside else [])
         for side, (board, name) in enumerate(zip(self._headings, self._names, strict=False)):
-            board.show([(Item(f"{name}: {'for comparison' if side else 'what is felt'}", bold=True),)])
+            what = "for comparison" if side else "what is felt"
+            board.show([(Item(f"{begun(renderer_words(name))}: {what}", bold=True),)])
 
     def next_words(self, frame: Frame) -> str:
         """What to do next: one thing at a time."""
         if self.guide is not None and self.guide.suggestion.kind != "stop":
-            return "\n".join(self.guide.lines())
-        lines = [] if self.guide is None else self.guide.lines()
+            return self.guide.lines()[0]
         if self.game is not None:
-            return "\n".join([*lines, *self.game.lines(time.perf_counter())])
-        return "\n".join(lines) if lines else self._next.line(frame)
+            return "\n".join(self.game.lines(time.perf_counter()))
+        return self._next.line(frame) if self.guide is None else self.guide.lines()[0]
+
+    @property
+    def known_words(self) -> str:
+        """What a guided exploration knows so far, '' without one."""
+        return "" if self.guide is None else self.guide.lines()[1]
 
     def run(
         self,
