@@ -34,7 +34,7 @@ from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
 from palpate.window.widgets import Board, Item
 from palpate.window.worker import Frame, Pace, RendererView, level
-from palpate.words import begun, renderer_words
+from palpate.words import begun, renderer_words, sentence
 
 if TYPE_CHECKING:
     from palpate.window.guide import Guide
@@ -307,10 +307,10 @@ class TouchWindow:
     def next_words(self, frame: Frame) -> str:
         """What to do next: one thing at a time."""
         if self.guide is not None and self.guide.suggestion.kind != "stop":
-            return self.guide.lines()[0]
+            return sentence(self.guide.lines()[0])
         if self.game is not None:
             return "\n".join(self.game.lines(time.perf_counter()))
-        return self._next.line(frame) if self.guide is None else self.guide.lines()[0]
+        return self._next.line(frame) if self.guide is None else sentence(self.guide.lines()[0])
 
     @property
     def known_words(self) -> str:

@@ -361,7 +361,7 @@ def test_a_guided_person_is_asked_for_one_thing_at_a_time(driven: Driven, monkey
     monkeypatch.setattr(window, "game", Game([NODULE], UP))
     driven.says("A nodule is hidden")
     monkeypatch.setattr(window, "guide", guide)
-    driven.says("press at the ghost")
+    driven.says("Press at the ghost.")
     driven.says("A nodule is hidden", says=False)
     guide.suggestion.kind = "stop"
     driven.says("A nodule is hidden")
