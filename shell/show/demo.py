@@ -50,12 +50,12 @@ def story(result: DemoResult) -> say.Story:
     yield say.Title(f"Palpate: {result.recording.object_name}, touched and felt", pictures="beside")
     model, servo = result.model, result.servo
     presses, modulus = f"{len(model.presses)} presses", model.material.young_modulus_pa
-    off = f"typically {force_words(result.replay_rmse_n)} off, in touches of "
-    off += force_words(result.contact_force_rms_n)
+    off, touches = force_words(result.replay_rmse_n), force_words(result.contact_force_rms_n)
     felt = f"a hand would have felt it at {servo.rate_hz:.0f} forces a second"
     yield say.Headline(f"{presses} became a model of {kpa(modulus)} (Young's modulus)", on=say.TEXT)
-    yield say.Headline(f"{presses} became a model that feels like the object: it is {off}", on=say.PAGE)
-    yield say.TextLine(f"its force is {off}")
+    feels = f"{presses} became a model that feels like the object"
+    yield say.Headline(f"{feels}, typically {off} off in touches of {touches}", on=say.PAGE)
+    yield say.TextLine(f"its force is typically {off} off, in touches of {touches}")
     missed = servo.missed_ticks
     of = f"{missed} forces were skipped"
     yield say.TextLine(f"{felt}: {of}, {servo.late_ticks} came late")

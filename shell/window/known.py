@@ -22,7 +22,7 @@ class KnownSoFar:
 
     def __init__(self, plotter: pyvista.Plotter) -> None:
         self._plotter = plotter
-        self._clouds: dict[str, pyvista.PolyData] = {}
+        self._drawn: dict[str, pyvista.Actor] = {}
         self.shown: dict[str, int] = {}
 
     def show(self, guide: Guide) -> None:
@@ -37,11 +37,10 @@ class KnownSoFar:
         if self.shown.get(name, 0) == len(points):
             return
         self.shown[name] = len(points)
-        if name in self._clouds:
-            self._plotter.subplot(0, 0)
-            self._plotter.remove_actor(name, render=False)
+        self._plotter.subplot(0, 0)
+        if (old := self._drawn.pop(name, None)) is not None:
+            self._plotter.remove_actor(old, render=False)
         if len(points):
-            self._plotter.subplot(0, 0)
-            self._clouds[name] = pyvista.PolyData(np.array(points, dtype=float))
+            cloud = pyvista.PolyData(np.array(points, dtype=float))
             look: dict[str, Any] = {"render_points_as_spheres": True, "point_size": WIDE_PX}
-            self._plotter.add_mesh(self._clouds[name], name=name, color=colour, lighting=False, **look)
+            self._drawn[name] = self._plotter.add_mesh(cloud, color=colour, lighting=False, **look)
