@@ -34,6 +34,14 @@ class ContactError(PalpateError):
     """A recording holds no usable boundary phase or too few palpations."""
 
 
+class FewPressesError(ContactError):
+    """Fewer presses than are asked for. usable: how many there are."""
+
+    def __init__(self, words: str, usable: int = 0) -> None:
+        super().__init__(words)
+        self.usable = usable
+
+
 class LoudAirError(ContactError):
     """What the sensor reads in free motion hides the presses."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.linear_range import linear_range
 from palpate.mechanics.disk.toml_text import plain
-from palpate.mechanics.errors import ContactError, OptionError
+from palpate.mechanics.errors import ContactError, FewPressesError, OptionError
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
@@ -191,7 +191,13 @@ def measure(recording: Recording, geometry: GeometryOptions, method: Method) -> 
         )
 
     if geometry.known:
-        pressed = without_slides(found(nowhere(recording)), options.contact.least_palpations)
+        try:
+            pressed = without_slides(found(nowhere(recording)), options.contact.least_palpations)
+        except FewPressesError as error:
+            if not error.usable:
+                raise
+            fewer = f"of a known object fewer tell a modulus, less surely: --least-palpations {error.usable}"
+            raise FewPressesError(f"{error}; {fewer}", error.usable) from error
         measured = within_slab(pressed, geometry.slab_m)
     else:
         measured = over_its_base(recording, found)

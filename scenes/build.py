@@ -23,7 +23,7 @@ from palpate.mechanics.disk.scratch import cache_folder
 from palpate.mechanics.disk.surface_files import surface_of
 from palpate.mechanics.disk.writing import atomic_folder
 from palpate.mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
-from palpate.mechanics.model.files import MODEL, read_model, write_model
+from palpate.mechanics.model.files import FELT, MODEL, read_model, write_model
 from palpate.mechanics.model.material import Ball, ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
@@ -35,7 +35,7 @@ from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.scenes.embedded import embedded_names, embedded_recording
 from palpate.scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
 from palpate.scenes.scene import Scene, ball_of
-from palpate.scenes.shipped import DamagedError, shipped_model, unpack
+from palpate.scenes.shipped import DamagedError, part_of, shipped_model, unpack
 from palpate.scenes.virtual_presses import palpate_model
 
 VERSION = 7
@@ -65,6 +65,18 @@ def model_of(
         raise SceneError(
             f"'{path}' cannot be written ({error}): set PALPATE_CACHE to a folder of yours"
         ) from error
+
+
+def kept_surface(scene: Scene, *, cache: Path | None = None) -> bytes | None:
+    """What a tip meets in the scene's model, as its .vtp holds it; None where no model is kept or shipped."""
+    path = _folder(scene, cache)
+    try:
+        if (path / FELT).is_file():
+            return (path / FELT).read_bytes()
+        archive = shipped_model(path.name)
+        return None if archive is None else part_of(archive, FELT)
+    except (OSError, DamagedError):
+        return None
 
 
 def _kept(path: Path, archive: Path | None) -> Model | None:

@@ -56,6 +56,15 @@ def shipped_model(name: str) -> Path | None:
     return path if path.is_file() else None
 
 
+def part_of(archive: Path, name: str) -> bytes:
+    """One file of an archive. Raises DamagedError where it cannot be read."""
+    try:
+        with zipfile.ZipFile(archive) as packed:
+            return packed.read(name)
+    except _DAMAGES as error:
+        raise DamagedError(f"'{archive}' is damaged ({error}): install the program again") from error
+
+
 def unpack(archive: Path, folder: Path) -> None:
     """Write the MODEL folder of an archive, with its compliance as the cache keeps it.
 

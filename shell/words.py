@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -42,9 +43,43 @@ def sentence(text: str) -> str:
     return ended(begun(text))
 
 
+MOST_WORDS = 20
+"""Of a headline."""
+_FLAGGED = re.compile(r"\s*\(([^()]*--[^()]*)\)")
+
+
+def headline(text: str) -> tuple[str, str]:
+    """(what a headline says, what follows it in small type, or ''): at most 20 words, where the text has an
+    end of a sentence or of a clause within them, and no flag of a command in brackets."""
+    flags = _FLAGGED.findall(text)
+    text = _FLAGGED.sub("", text)
+    first, rest = text, ""
+    if len(text.split()) > MOST_WORDS:
+        for end in (r"(?<=[.!?])\s+", r";\s+", r"\s+(?=\()", r":\s+", r",\s+"):
+            cuts = [found.span() for found in re.finditer(end, text)]
+            if within := [(a, b) for a, b in cuts if 2 < len(text[:a].split()) <= MOST_WORDS]:
+                first, rest = text[: within[-1][0]], text[within[-1][1] :]
+                break
+    return first, " ".join(filter(None, [rest and sentence(rest), *map(sentence, flags)]))
+
+
 def counted(number: int, thing: str) -> str:
     """'1 curve', '3 curves'."""
     return f"{number} {thing}{'s' * (number != 1)}"
+
+
+_RENDERERS = {
+    "fem": "this model",
+    "kelvin-voigt": "spring and damper",
+    "hunt-crossley": "stiffening spring",
+    "hunt-crossley-undamped": "stiffening spring, no damper",
+    "hunt-crossley-kh": "stiffening spring, one power",
+}
+
+
+def renderer_words(name: str) -> str:
+    """A renderer as a person who knows none calls it; another simulator by its name."""
+    return _RENDERERS.get(name, name)
 
 
 def signed(words: str, value: Any) -> tuple[str, int]:

@@ -81,7 +81,7 @@ SCHEMA: Schema = {
     "end": {"whole": FileKey(bool, required=True)},
 }
 """What model.toml may hold; further tables inform and are left alone. Each effect says its own keys."""
-SHAPE = "shape.vtp"
+SHAPE, FELT = "shape.vtp", "surface.vtp"
 _NEEDED = ("material", "tool", "mesh", "frame")
 
 MODEL = FolderKind(
@@ -94,7 +94,7 @@ MODEL = FolderKind(
         "shape.vtp",
         "presses.bin",
         "palpations.csv",
-        "surface.vtp",
+        FELT,
         "*.cache",
         "compliance-*.bin",
         "places-*.bin",

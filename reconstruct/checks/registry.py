@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.mechanics.errors import ContactError, NoBaseError, RecordingError
+from palpate.mechanics.errors import ContactError, FewPressesError, NoBaseError, RecordingError
 from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.checks.air import air, delay
@@ -111,7 +111,7 @@ def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[Findin
     except NoBaseError as error:
         return ordered([*found, _refused(recording, "no base", error, OF_A_KNOWN_OBJECT)])
     except ContactError as error:
-        return ordered([*found, _refused(recording, "no presses", error, ())])
+        return ordered([*found, _refused(recording, "no presses", error, _with_few(error))])
     return ordered([*found, *checked_presses(exploration)])
 
 
@@ -188,6 +188,13 @@ def _too_short(recording: Recording) -> Finding:
         (float(recording.t[0]), float(recording.t[-1])),
         ways=OF_A_KNOWN_OBJECT,
     )
+
+
+def _with_few(error: ContactError) -> tuple[Way, ...]:
+    """Ways for the presses that there are: on something flat few tell a modulus, less surely."""
+    few = error.usable if isinstance(error, FewPressesError) else 0
+    flat = (way for way in OF_A_KNOWN_OBJECT if few and "shape" not in way.options)
+    return tuple(Way(way.says, {**way.options, "least_palpations": few}) for way in flat)
 
 
 def _refused(recording: Recording, name: str, error: ContactError, ways: tuple[Way, ...]) -> Finding:

@@ -25,6 +25,7 @@ from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.disk.toml_text import plain
 from palpate.mechanics.disk.vtk_files import vtk_bytes
 from palpate.mechanics.disk.writing import atomic_file
+from palpate.mechanics.model.files import FELT
 from palpate.mechanics.model.model import Model
 from palpate.render.base import Renderer
 from palpate.render.effects import rendered_touch
@@ -32,7 +33,6 @@ from palpate.render.fem.renderer import FemRenderer
 from palpate.render.options import RenderOptions
 from palpate.render.surface.snapping import surface_uncertainty, touched_surface
 
-FILE = "surface.vtp"
 OWN_DEPTH_M = 1e-3
 """Depth of the press by which a place's own stiffness is stated."""
 PRESSES, TOUCHES = "presses", "touch sites"
@@ -201,7 +201,7 @@ def _keep(model: Model, surface: FeltSurface) -> FeltSurface:
     shape.field_data["material_key"] = [_material_key(model)]
     shape.field_data["stiffness_from"] = [surface.stiffness_from]
     try:
-        with atomic_file(Path(model.path) / FILE) as temporary:
+        with atomic_file(Path(model.path) / FELT) as temporary:
             temporary.write_bytes(vtk_bytes(shape))
     except OSError:
         pass  # a full or read-only disk: the surface in memory serves as well
@@ -212,7 +212,7 @@ def _load(model: Model) -> FeltSurface | None:
     """What the model's folder holds; None where that is absent, damaged or of another mesh or touches."""
     import pyvista
 
-    path = None if model.path is None else Path(model.path) / FILE
+    path = None if model.path is None else Path(model.path) / FELT
     if path is None or not path.is_file():
         return None
     try:

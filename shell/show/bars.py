@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from textwrap import fill
 from typing import Any
 
+from palpate.show.colours import COLOURS
 from palpate.words import mn
 
-_INK = "#4a5560"
+_INK = COLOURS["noise"]
 
 
 def height_of(bars: int) -> float:

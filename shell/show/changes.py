@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.diagnosis.compare.before_after import Changes
 from palpate.show import story as say
+from palpate.show.colours import COLOURS
 from palpate.show.diagnosis.words import verdict
 from palpate.show.model import thing_of, usual_colourings
 from palpate.show.page import drawn, file_words
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
-_COLOURS = ("#1d3557", "#c1121f")
 _RATIO = ShownQuantity("second over first modulus", "", 1.0, "coolwarm", least_share=0.2)
 
 
@@ -47,7 +47,7 @@ def story(result: Changes) -> say.Story:
         say.Picture(picture, f"{ratio}." if result.places else "Moduli, 95 % sure."),
         result.before.model,
     )
-    yield say.Section("Both by themselves", _both(result))
+    yield say.Section("What is each by itself?", _both(result))
     yield from map(say.Note, result.reasons)
     bars = ratio if result.places else "Both moduli"
     yield say.Picture(picture, f"{bars}, 95 % sure within the bars.")
@@ -168,15 +168,24 @@ def draw(result: Changes, ax: Axes) -> None:
         ratio = np.array([result.places[i].ratio for i in order])
         ends = np.array([result.places[i].ci95 for i in order])
         x = np.arange(len(ratio))
-        ax.errorbar(x, ratio, np.abs(ends.T - ratio), fmt="o", ms=4, color=_COLOURS[0], label="at a place")
-        ax.axhspan(*result.ratio_ci95, color=_COLOURS[1], alpha=0.2, label="of the whole")
-        ax.axhline(1.0, color="0.5", lw=1, ls="--")
+        ax.errorbar(
+            x, ratio, np.abs(ends.T - ratio), fmt="o", ms=4, color=COLOURS["press"], label="at a place"
+        )
+        ax.axhspan(*result.ratio_ci95, color=COLOURS["interval"], label="of the whole")
+        ax.axhline(1.0, color=COLOURS["reference"], lw=1, ls="--")
         ax.set(xlabel="place, sorted", ylabel="second over first modulus")
         ax.legend(frameon=False, fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
         return
     for k, side in enumerate((result.before, result.after)):
         value = side.modulus_pa / 1e3
         low, high = (v / 1e3 for v in side.model.material.young_modulus_ci95_pa)
-        ax.errorbar([k], [value], [[value - low], [high - value]], fmt="o", color=_COLOURS[k], capsize=4)
+        ax.errorbar(
+            [k],
+            [value],
+            [[value - low], [high - value]],
+            fmt="o",
+            color=COLOURS[("first", "second")[k]],
+            capsize=4,
+        )
     ax.set_xticks([0, 1], [result.before.recording.name, result.after.recording.name])
     ax.set(ylabel="Young's modulus [kPa]", xlim=(-0.5, 1.5))

@@ -11,9 +11,9 @@ from palpate.operations._written import open_words
 from palpate.reconstruction.checks.finding import Checkup, Finding, Way
 from palpate.reconstruction.checks.samples import CHANNELS
 from palpate.show import story as say
+from palpate.show.colours import COLOURS
 from palpate.show.page import drawn, file_words, subplots
 from palpate.show.quantities import readable
-from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.show.scenery import add_path, look_around
 from palpate.words import counted
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pyvista import Plotter
 
-QUIET = ("#8d99ae", "#b8b08d", "#a3b899")
-_LOUD = ("#c1121f", "#9d4edd", "#d97706")
+_QUIET = 0.45
+"""How strongly a channel is drawn that a finding is not about."""
 _MOST = 8000
 _MARGIN = 0.35
 
@@ -50,9 +50,11 @@ def story(result: Checkup) -> say.Story:
     )
     for k, finding in enumerate(findings, 1):
         yield say.Section(
-            f"{k}. {finding.name}{' (grave)' if finding.grave else ''}", _found(result, finding, k)
+            f"{k}. {finding.name}{' (grave)' if finding.grave else ''}",
+            _found(result, finding, k),
+            unfolded=k == 1,
         )
-    yield say.Section("What was measured", [
+    yield say.Section("What was measured?", [
         say.Rows(["quantity", "here", "usual"], (_seen(*row) for row in result.seen))
     ])  # fmt: skip
 
@@ -89,13 +91,13 @@ def draw(result: Checkup, ax: Axes) -> None:
     """Length of the force (N) over time (s); the findings' stretches shaded, grave ones red."""
     recording = result.recording
     rows = _rows(0, len(recording.t))
-    ax.plot(recording.t[rows], recording.force_n[rows], lw=0.7, color=FORCE_COLOUR)
+    ax.plot(recording.t[rows], recording.force_n[rows], lw=0.7, color=COLOURS["measured"])
     length = recording.duration_s
     for k, finding in enumerate(reversed(result.findings)):
         if finding.stretch is None:
             continue
         begin, end = finding.stretch
-        colour = PEAK_COLOUR if finding.grave else PHASE_COLOUR
+        colour = COLOURS["grave" if finding.grave else "finding"]
         ax.axvspan(begin, max(end, begin + 0.003 * length), color=colour, alpha=0.25, zorder=0)
         number = len(result.findings) - k
         ax.text(begin, 0.97, str(number), transform=ax.get_xaxis_transform(), va="top", fontsize=9)
@@ -145,9 +147,9 @@ def stretch_figure(recording: Recording, finding: Finding) -> Figure:
         for k, name in enumerate(names):
             loud = name in finding.channels
             ax.plot(t, values[:, k], marker=marker, lw=1.5 if loud else 0.8, zorder=3 if loud else 2,
-                    color=_LOUD[k] if loud else QUIET[k], label=name)  # fmt: skip
+                    color=COLOURS["xyz"[k]], alpha=1.0 if loud else _QUIET, label=name)  # fmt: skip
         if (begin, end) != whole:
-            ax.axvspan(begin, end, color=PHASE_COLOUR, zorder=0)
+            ax.axvspan(begin, end, color=COLOURS["finding"], zorder=0)
         ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     axes[0].set_ylabel("position less its mean [mm]")
     axes[1].set(ylabel="force on the tool [N]", xlabel="time [s]")

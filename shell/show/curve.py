@@ -12,6 +12,7 @@ from palpate.render.base import Renderer
 from palpate.render.force_error import said
 from palpate.render.press import Curve
 from palpate.show import story as say
+from palpate.show.colours import COLOURS, colour_of
 from palpate.show.page import feel_step
 from palpate.words import kpa, mm, unsettled_words
 
@@ -91,15 +92,20 @@ def draw(result: Curve, ax: Axes) -> None:
     """Force along the normal, and its length, over depth."""
     touching = result.depth > 0
     depth = result.depth[touching] * 1e3
-    ax.plot(depth, result.force[touching] @ result.normal, color="#1d3557", label="along the normal")
+    ax.plot(
+        depth,
+        result.force[touching] @ result.normal,
+        color=colour_of(_renderer(result).name),
+        label="along the normal",
+    )
     size = np.linalg.norm(result.force[touching], axis=1)
-    ax.plot(depth, size, "--", lw=1, color="#e08e1b", label="magnitude")
+    ax.plot(depth, size, "--", lw=1, color=COLOURS["reference"], label="magnitude")
     if result.exact is not None:
         own = result.exact
         low, high = own.law_n - own.error_n, own.law_n + own.error_n
-        ax.fill_between(own.depth_m * 1e3, low, high, color="#a8bccb", alpha=0.5, label="the law's bound")
-        ax.plot(own.depth_m * 1e3, own.law_n, ":", color="#457b9d", label="by the law")
-        ax.plot(own.depth_m * 1e3, own.solved_n, "o", color="#1d3557", ms=4, label="solved")
+        ax.fill_between(own.depth_m * 1e3, low, high, color=COLOURS["interval"], label="the law's bound")
+        ax.plot(own.depth_m * 1e3, own.law_n, ":", color=COLOURS["simplest"], label="by the law")
+        ax.plot(own.depth_m * 1e3, own.solved_n, "o", color=COLOURS["found"], ms=4, label="solved")
     ax.set(xlabel="depth [mm]", ylabel="force on the tool [N]", title=_renderer(result).name)
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)

@@ -14,6 +14,7 @@ from palpate.render.surface.felt_surface import felt_surface
 from palpate.servo.report import ServoReport
 from palpate.show import model as made
 from palpate.show import story as say
+from palpate.show.colours import COLOURS
 from palpate.show.diagnosis.gaps import known
 from palpate.show.diagnosis.words import verdict
 from palpate.show.model import local, rms_by_press, usual_colourings, view_of_presses
@@ -49,12 +50,12 @@ def story(result: DemoResult) -> say.Story:
     yield say.Title(f"Palpate: {result.recording.object_name}, touched and felt", pictures="beside")
     model, servo = result.model, result.servo
     presses, modulus = f"{len(model.presses)} presses", model.material.young_modulus_pa
-    off = f"typically {force_words(result.replay_rmse_n)} off, in touches of "
-    off += force_words(result.contact_force_rms_n)
+    off, touches = force_words(result.replay_rmse_n), force_words(result.contact_force_rms_n)
     felt = f"a hand would have felt it at {servo.rate_hz:.0f} forces a second"
     yield say.Headline(f"{presses} became a model of {kpa(modulus)} (Young's modulus)", on=say.TEXT)
-    yield say.Headline(f"{presses} became a model that feels like the object: it is {off}", on=say.PAGE)
-    yield say.TextLine(f"its force is {off}")
+    feels = f"{presses} became a model that feels like the object"
+    yield say.Headline(f"{feels}, typically {off} off in touches of {touches}", on=say.PAGE)
+    yield say.TextLine(f"its force is typically {off} off, in touches of {touches}")
     missed = servo.missed_ticks
     of = f"{missed} forces were skipped"
     yield say.TextLine(f"{felt}: {of}, {servo.late_ticks} came late")
@@ -77,19 +78,19 @@ def story(result: DemoResult) -> say.Story:
         ),
         model,
     )
-    yield say.Section("Measured and rendered force", _presses(result))
+    yield say.Section("How near is the rendered force to the measured one?", _presses(result))
     if result.diagnosis is not None:
         yield say.Section(
-            "What a simpler simulation would leave out", [say.Sentence(diagnosis_words(result))]
+            "What would a simpler simulation leave out?", [say.Sentence(diagnosis_words(result))]
         )
-    yield say.Section("What the hand did", [
+    yield say.Section("What did the hand do?", [
         say.Picture(
             lambda: force_figure(result),
             "Force over time: first the base is traced (phase I), then the object is pressed.",
             name="force",
         )
     ])  # fmt: skip
-    yield say.Section("How it was made", _how(result))
+    yield say.Section("How was it made?", _how(result))
 
 
 def _presses(result: DemoResult) -> say.Story:
@@ -225,8 +226,8 @@ def press_figure(result: DemoResult, i: int) -> Figure:
     own = curves.rows([i])
     depth, at = smooth.depth[own] * 1e3, np.searchsorted(result.recording.t, curves.t[own])
     rendered = result.rendered_n[at] @ presses.normal[i]
-    ax.plot(depth, curves.push[own], ".", ms=1, color="#a8bccb", label="measured")
-    ax.plot(depth, rendered, lw=1.5, color="#c1121f", label="rendered")
+    ax.plot(depth, curves.push[own], ".", ms=1, color=COLOURS["measured"], label="measured")
+    ax.plot(depth, rendered, lw=1.5, color=COLOURS["fem"], label="rendered")
     ax.set(title=f"press {i + 1}", xlabel="depth [mm]", ylabel="force along the normal [N]")
     ax.set_ylim(top=1.05 * max(_peaks(shown)))
     ax.legend(loc="upper left", frameon=False, markerscale=8)
@@ -242,7 +243,7 @@ def view(result: DemoResult) -> View:
     each = rms_by_press(shown, off)
     lines = [
         Line("measured", local(shown, shown.force), "measured"),
-        Line("rendered", local(shown, result.rendered_n[at]), "rendered"),
+        Line("rendered", local(shown, result.rendered_n[at]), "fem"),
         *_simulated(result, shown.t),
     ]
     error = Colouring(
@@ -271,7 +272,7 @@ def _simulated(result: DemoResult, t: np.ndarray) -> list[Line]:
     between = touches.t[following] - touches.t[following - 1] > _STEP_S
     lines = []
     for name, residual, kind in (
-        ("ideal simulation (linear, small strain)", found.residual_before, "effect"),
+        ("ideal simulation (linear, small strain)", found.residual_before, "simplest"),
         ("simulation with what was found", found.residual_after, "found"),
     ):
         force = touches.local_force - residual

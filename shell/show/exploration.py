@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.diagnosis.explore.suggestion import Explored, Step
 from palpate.show import story as say
+from palpate.show.colours import COLOURS
 from palpate.show.page import drawn, file_words
 from palpate.show.quantities import ORDER, UNCERTAINTY, softness
 from palpate.show.view3d import Colouring, Thing, View
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
-MODULUS_COLOUR, SURFACE_COLOUR, GOAL_COLOUR = "#1d3557", "#e08e1b", "#2a9d8f"
 _REACHED = {True: "yes", False: "not yet"}
 _NAMES = {"modulus": "Young's modulus", "surface": "surface", "cause": "one cause alone"}
 
@@ -47,17 +47,19 @@ def story(result: Explored) -> say.Story:
         ["goal", "now", "wanted", "reached"],
         [[_NAMES[g.name], _goal(g.name, g.now), _goal(g.name, g.goal), _REACHED[g.met]] for g in state.goals],
     )
-    yield say.Pictures([
-        say.Picture(lambda: drawn(draw, result, 5, 3.4), "How the modulus became known, press by press."),
-        say.Picture(lambda: drawn(_draw_surface, result, 5, 3.4), "How the surface became known."),
-    ])  # fmt: skip
     if result.estimate.surface is not None:
         flat = say.Picture(
             lambda: drawn(_draw_places, result, 5, 4),
             "The places touched from above, in order; the line is the outline there.",
         )
-        yield say.Section("Where it was touched", [say.Turned(lambda: view(result), flat)])
-    yield say.Section("Every touch, and why there", [
+        yield say.Turned(lambda: view(result), flat)
+    yield say.Section("How did it become known?", [
+        say.Pictures([
+            say.Picture(lambda: drawn(draw, result, 5, 3.4), "The modulus, press by press."),
+            say.Picture(lambda: drawn(_draw_surface, result, 5, 3.4), "The surface."),
+        ])
+    ])  # fmt: skip
+    yield say.Section("Why was each touch made there?", [
         say.Rows(["touch", "suggested because", "known after it"], _rows(result))
     ])  # fmt: skip
 
@@ -71,9 +73,9 @@ def draw(result: Explored, ax: Axes) -> None:
     known = _known(result.steps)
     made = [s.state.made for s in known]
     low, high = (np.array([s.state.modulus_ci95_pa[k] for s in known]) / 1e3 for k in (0, 1))
-    ax.fill_between(made, low, high, color=MODULUS_COLOUR, alpha=0.18, lw=0, label="95 % sure")
+    ax.fill_between(made, low, high, color=COLOURS["modulus"], alpha=0.18, lw=0, label="95 % sure")
     modulus = [s.state.modulus_pa / 1e3 for s in known]
-    ax.plot(made, modulus, "o-", ms=4, color=MODULUS_COLOUR, label="estimate")
+    ax.plot(made, modulus, "o-", ms=4, color=COLOURS["modulus"], label="estimate")
     _over_presses(ax, "Young's modulus [kPa]")
     if known:
         last = modulus[-1]
@@ -90,10 +92,10 @@ def _draw_surface(result: Explored, ax: Axes) -> None:
     """mm within which 95 % of the surface lies, over the presses made, with the goal."""
     known = [s for s in result.steps if np.isfinite(s.state.surface_error_m)]
     error = [1e3 * s.state.surface_error_m for s in known]
-    ax.plot([s.state.made for s in known], error, "o-", ms=4, color=SURFACE_COLOUR, label="estimate")
+    ax.plot([s.state.made for s in known], error, "o-", ms=4, color=COLOURS["surface"], label="estimate")
     if result.goals.surface_within_m is not None:
         goal = 1e3 * result.goals.surface_within_m
-        ax.axhline(goal, ls="--", lw=1, color=GOAL_COLOUR, label="goal")
+        ax.axhline(goal, ls="--", lw=1, color=COLOURS["goal"], label="goal")
     _over_presses(ax, "95 % of the surface within [mm]")
     ax.set_ylim(bottom=0)
     if known:
@@ -104,12 +106,12 @@ def place(result: Explored, plotter: Plotter) -> None:
     """The surface so far, its touches numbered by colour."""
     import pyvista
 
-    from palpate.show.scenery import OBJECT_COLOUR, add_dots
+    from palpate.show.scenery import add_dots
 
     surface, touched = result.estimate.surface, _touched(result)
     if surface is not None:
         faces = pyvista.PolyData.from_regular_faces(surface.vertices, surface.triangles)
-        plotter.add_mesh(faces, color=OBJECT_COLOUR, smooth_shading=True)
+        plotter.add_mesh(faces, color=COLOURS["object"], smooth_shading=True)
     add_dots(plotter, touched, np.arange(1.0, len(touched) + 1), label=ORDER.label)
 
 
@@ -164,8 +166,8 @@ def _draw_places(result: Explored, ax: Axes) -> None:
     across = level_axes(surface.support_normal)
     places = 1e3 * (_touched(result) - surface.support_point) @ across.T
     edge = 1e3 * (surface.vertices - surface.support_point) @ across.T
-    ax.triplot(edge[:, 0], edge[:, 1], surface.triangles, lw=0.15, color="#b8b0a4")
-    ax.plot(places[:, 0], places[:, 1], "o", ms=5, color="#c1121f")
+    ax.triplot(edge[:, 0], edge[:, 1], surface.triangles, lw=0.15, color=COLOURS["mesh"])
+    ax.plot(places[:, 0], places[:, 1], "o", ms=5, color=COLOURS["touch"])
     for k, (x, y) in enumerate(places, 1):
         ax.annotate(str(k), (x, y), xytext=(3, 3), textcoords="offset points", fontsize=8)
     ax.set_aspect("equal")

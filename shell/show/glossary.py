@@ -63,7 +63,10 @@ class Terms:
             f'<dt id="{slug}">{html.escape(word)}</dt><dd>{html.escape(WORDS[word])}</dd>'
             for word, slug in sorted(self.used.items(), key=lambda item: item[0].lower())
         )
-        return f'<h2>Words</h2><dl class="words">{entries}</dl>'
+        return (
+            '<details class="chapter" id="words"><summary><h2>What do the words mean?</h2></summary>'
+            f'<dl class="words">{entries}</dl></details>'
+        )
 
 
 def _slug(word: str) -> str:

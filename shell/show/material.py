@@ -11,6 +11,7 @@ import numpy as np
 from palpate.diagnosis.specimen.result import FLOORS, Material
 from palpate.mechanics.quantities import fitting_unit, quantity_words, split_key
 from palpate.show import story as say
+from palpate.show.colours import COLOURS
 from palpate.show.diagnosis.words import meaning as meaning_of
 from palpate.show.page import drawn
 from palpate.show.quantities import readable, softness
@@ -42,7 +43,7 @@ def story(result: Material) -> say.Story:
         closed, low, high = (100 * min(share, 1.0) for share in (result.closed, *result.closed_ci95))
         interval = sure(f"{low:.0f}", f"{high:.0f} %")
         yield say.TextLine(f"what was found explains {closed:.0f} % of the gap ({interval})")
-    yield say.Section("How far it is off", [
+    yield say.Section("How far is it off?", [
         say.Sentence(
             f"Each way was fitted to the rest and predicts what was left out ({result.held_out}). A spring "
             "and damper is what one has without a theory of the material; a regression follows the curves "
@@ -53,7 +54,7 @@ def story(result: Material) -> say.Story:
     rows = [[_called(name), in_words(name, v)] for name, v in result.parameters.items()]
     yield from (say.Detail(f"{what}: {value}", on=say.TEXT) for what, value in rows)
     if rows:
-        yield say.Section("What was found", [say.Rows(["what", "value"], rows)])
+        yield say.Section("What was found?", [say.Rows(["what", "value"], rows)])
     yield from map(say.Note, result.notes)
     if result.unknown:
         unknown = ", ".join(map(spaced, result.unknown))
@@ -233,14 +234,19 @@ def draw(result: Material, ax: Axes) -> None:
         rivals = [n for n in FLOORS.get(result.kind, ()) if n in result.error]
         best = min(rivals, key=lambda n: result.error[n]) if rivals else own
         names = [n for n in dict.fromkeys(("constant", "regression", best, own)) if n in result.error]
-        ax.barh([_way(n) for n in names], [100 * result.error[n] for n in names], color="#2a9d8f", height=0.6)
+        ax.barh(
+            [_way(n) for n in names],
+            [100 * result.error[n] for n in names],
+            color=COLOURS["found"],
+            height=0.6,
+        )
         ax.set(xlabel="error on held-out data [%]")
         ax.spines[["top", "right"]].set_visible(False)
         return
     x, measured, predicted, across, up = result.seen
     across, along = readable(across, [*x])
     up, both = readable(up, [*measured, *predicted])
-    ax.plot(along, both[: len(measured)], ".", ms=4, color="#c1121f", label="measured")
-    ax.plot(along, both[len(measured) :], "-", lw=1, color="#1d3557", label=_by(result))
+    ax.plot(along, both[: len(measured)], ".", ms=4, color=COLOURS["measured"], label="measured")
+    ax.plot(along, both[len(measured) :], "-", lw=1, color=COLOURS["fem"], label=_by(result))
     ax.set(xlabel=across, ylabel=up)
     ax.legend(frameon=False)

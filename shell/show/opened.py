@@ -34,7 +34,7 @@ def story(result: Opened) -> say.Story:
         whole = isinstance(block, say.Title) or (isinstance(block, say.Section) and block.evidence)
         if block.on != say.TEXT and not whole:
             yield block if isinstance(block, say.Next) else replace(block, on=say.PAGE)
-    yield say.Section("What the file was taken for", [
+    yield say.Section("What was the file taken for?", [
         say.Rows(["what", "as"], [[key, value] for key, value in result.understood.items()]),
         *map(say.Note, result.notes),
     ])  # fmt: skip

@@ -16,6 +16,7 @@ from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.registry import effect
 from palpate.show import story as say
+from palpate.show.colours import COLOURS
 from palpate.show.diagnosis import place as place_gap
 from palpate.show.diagnosis.figures import curve_pictures, first_picture, press_pictures
 from palpate.show.diagnosis.figures import view as view_of_gap
@@ -30,9 +31,7 @@ if TYPE_CHECKING:
 
     from palpate.show.view3d import View
 
-COLOURS = {
-    "numerics": "#1d3557", "parameters": "#2a9d8f", "reality": "#e76f51", "unexplained": "#c9c9c9",
-}  # fmt: skip
+_OTHER = "other-simulator"
 MEANING = {
     "numerics": "what the simulator adds of its own",
     "parameters": "what it was given wrongly",
@@ -99,7 +98,7 @@ def draw(result: SimulatedGap, ax: Axes) -> None:
 
 def view(result: SimulatedGap) -> View:
     """The object by its gap; each press as measured, simulated, and with all that is named mended."""
-    return view_of_gap(as_diagnosis(result))
+    return view_of_gap(as_diagnosis(result), _OTHER)
 
 
 def place(result: SimulatedGap, plotter: Plotter) -> None:
@@ -183,19 +182,20 @@ def story(result: SimulatedGap) -> say.Story:
     yield say.TextLine(f"given to {about.name}{version}: {given}")
     yield from (say.Note(f"note: {note}") for note in result.notes)
     yield from (say.Note(reason, on=say.TEXT) for reason in result.reasons)
+    yield from _seen(result)
     shares = (result.unexplained, *(part.share for part in result.parts.values()))
     if sum(share > SHOWN for share in shares) > 1:
-        yield say.Picture(
+        bars = say.Picture(
             lambda: drawn(draw, result, 9, 1.7),
             "Taken off one after another, at held-out places: numerics, parameters, then what "
             f"every ideal simulation lacks. Of the remaining gap {percent(result.noise_share)} is the "
             f"sensor's "
             f"noise and {percent(result.touch_share)} where exactly the object was first met.",
         )
-    yield say.Section("", _seen(result))
-    yield say.Section("What the simulator was given", _stated(result))
-    yield say.Section("What was tried", _tried(result))
-    yield say.Section("What the difference depends on", _depends(result))
+        yield say.Section("How large is each part?", [bars])
+    yield say.Section("What was the simulator given?", _stated(result))
+    yield say.Section("What was tried?", _tried(result))
+    yield say.Section("What does the difference depend on?", _depends(result))
 
 
 def _parts(result: SimulatedGap) -> say.Story:
@@ -227,9 +227,9 @@ def _seen(result: SimulatedGap) -> say.Story:
     shown, model = as_diagnosis(result), result.reality.model
     assert model is not None
     yield say.Turned(
-        lambda: view_of_gap(shown),
+        lambda: view_of_gap(shown, _OTHER),
         say.Picture(
-            lambda: first_picture(model, shown),
+            lambda: first_picture(model, shown, _OTHER),
             "Left: how far this simulator is from the measured force around each place. Right: one press, "
             "measured, simulated, and (dashed) with all that is named mended.",
         ),
@@ -241,7 +241,7 @@ def _depends(result: SimulatedGap) -> say.Story:
     shown = as_diagnosis(result)
     yield goes_with(result, "the difference depends on")
     yield say.Pictures(curve_pictures(shown))
-    yield say.Pictures(press_pictures(shown))
+    yield say.Pictures(press_pictures(shown, _OTHER))
     yield from map(say.Note, result.reasons)
 
 

@@ -91,6 +91,29 @@
     code.after(button("copy", "copy this command", (by) => copy(code.textContent, by)));
   });
 
+  // chapters: a link to what is folded away opens it, a print shows all, a long page shows its contents
+  const chapters = [...document.querySelectorAll("details.chapter")], nav = document.querySelector("nav.contents");
+  const LONG_PX = 3000;
+  const unfold = (hash) => {
+    const found = hash.length > 1 && document.getElementById(decodeURIComponent(hash.slice(1)));
+    for (let at = found; at; at = at.parentElement) if (at.tagName === "DETAILS") at.open = true;
+    if (found) found.scrollIntoView();
+  };
+  document.addEventListener("click", (event) => {
+    const link = event.target.closest('a[href^="#"]');
+    if (link) unfold(link.getAttribute("href"));
+  });
+  unfold(location.hash);
+  let shut = [];
+  addEventListener("beforeprint", () => {
+    shut = chapters.filter((chapter) => !chapter.open);
+    shut.forEach((chapter) => { chapter.open = true; });
+  });
+  addEventListener("afterprint", () => shut.forEach((chapter) => { chapter.open = false; }));
+  const measure = () => { if (nav) nav.hidden = document.documentElement.scrollHeight <= LONG_PX; };
+  chapters.forEach((chapter) => chapter.addEventListener("toggle", measure));
+  addEventListener("load", measure);
+
   const result = document.querySelector("script.result");
   if (result) {
     const tools = document.createElement("p");

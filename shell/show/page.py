@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.disk.writing import PNG, Kind, atomic_file
 from palpate.output import plain
+from palpate.show.colours import style_sheet
 from palpate.show.glossary import Terms
 from palpate.show.story import (
     TEXT,
@@ -38,7 +39,7 @@ from palpate.show.story import (
     Title,
     Turned,
 )
-from palpate.words import ended, sentence
+from palpate.words import ended, headline, sentence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +67,9 @@ class Page:
         self.title = title
         self._folder = folder
         self._parts: list[str] = [f"<h1>{html.escape(title)}</h1>"]
-        self._live = False
+        self._live = self._inside = False
+        self._chapters: list[str] = []
+        self._first: int | None = None
         self._terms = Terms()
         self._result = ""
         self._drawn: list[tuple[Any, bytes, str]] = []
@@ -78,7 +81,10 @@ class Page:
                 continue
             match block:
                 case Headline(text=text):
-                    self.lead(ended(text))
+                    first, rest = headline(text)
+                    self.lead(ended(first))
+                    if rest:
+                        self.paragraph(rest)
                 case Sentence(text=text) | Note(text=text):
                     self.paragraph(sentence(text))
                 case Detail(text=text):
@@ -98,14 +104,30 @@ class Page:
                         self.view(view, self._picture(still), still.caption, model)
                 case Markup(html=text):
                     self.part(text)
-                case Section(heading=heading, blocks=blocks):
-                    if heading:
-                        self.heading(heading)
+                case Section(heading="", blocks=blocks):
                     self.tell(blocks)
+                case Section(heading=heading, blocks=blocks, unfolded=unfolded):
+                    self._chapter(heading, blocks, unfolded)
 
     def heading(self, text: str) -> None:
-        """A section's heading."""
+        """A section's heading, of what is not folded."""
         self._parts.append(f"<h2>{html.escape(text)}</h2>")
+
+    def _chapter(self, heading: str, blocks: Story, unfolded: bool) -> None:
+        """Blocks folded under a heading, left out where they come to nothing; within a chapter a heading."""
+        outer, self._parts, inside = self._parts, [], self._inside
+        self._inside = True
+        self.tell(blocks)
+        told, self._parts, self._inside = self._parts, outer, inside
+        if not told:
+            return
+        if inside:
+            self._parts += [f"<h3>{html.escape(heading)}</h3>", *told]
+            return
+        if self._first is None:
+            self._first = len(self._parts)
+        self._chapters.append(heading)
+        self._parts += [folded(heading, len(self._chapters), unfolded), *told, "</details>"]
 
     def lead(self, text: str) -> None:
         """The answer, in large type."""
@@ -179,11 +201,12 @@ class Page:
 
     def html(self) -> str:
         """The whole page."""
+        first = len(self._parts) if self._first is None else self._first
         return (
             '<!doctype html><html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f"<title>{html.escape(self.title)}</title><style>{_file('page.css')}</style></head><body>"
-            + "\n".join(self._parts)
+            f"<title>{html.escape(self.title)}</title><style>{style_sheet()}{_file('page.css')}</style></head><body>"
+            + "\n".join([*self._parts[:first], contents(self._chapters), *self._parts[first:]])
             + self._terms.listed()
             + self._result
             + "<footer>Made by palpate. Positions are in the device's frame, forces are those on the tool."
@@ -245,6 +268,23 @@ def page_of(title: Title, story: Story, figures: Mapping[str, Any], path: Path |
     page.tell(story)
     page.result(figures)
     return page.write(path)
+
+
+def folded(heading: str, number: int, unfolded: bool = False) -> str:
+    """What begins a chapter, which `</details>` ends."""
+    shown = " open" if unfolded else ""
+    return (
+        f'<details class="chapter" id="chapter-{number}"{shown}><summary><h2>{html.escape(heading)}</h2>'
+        "</summary>"
+    )
+
+
+def contents(headings: Sequence[str]) -> str:
+    """A table of contents, which `page.js` shows on a long page."""
+    links = "".join(
+        f'<a href="#chapter-{k}">{html.escape(heading)}</a>' for k, heading in enumerate(headings, 1)
+    )
+    return f'<nav class="contents" hidden>{links}</nav>' if links else ""
 
 
 def scrolling(wide: str) -> str:

@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.mechanics.recording.recording import Recording
+from palpate.show.colours import COLOURS
 from palpate.show.story import Detail, Headline, Story
 from palpate.words import mm, mn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
-
-FORCE_COLOUR, TOUCH_COLOUR, PEAK_COLOUR, PHASE_COLOUR = "#457b9d", "#1d3557", "#c1121f", "#f1e3cf"
-"""Of every picture over time: the force, first touches, peaks (and what is grave), phase I."""
 
 
 def story(result: Recording) -> Story:
@@ -37,9 +35,9 @@ def story(result: Recording) -> Story:
 
 def draw(result: Recording, ax: Axes) -> None:
     """Force over time."""
-    ax.plot(result.t, result.force_n, lw=0.7, color=FORCE_COLOUR)
+    ax.plot(result.t, result.force_n, lw=0.7, color=COLOURS["measured"])
     if result.boundary_phase is not None:
-        ax.axvspan(*result.boundary_phase, color=PHASE_COLOUR, zorder=0, label="phase I")
+        ax.axvspan(*result.boundary_phase, color=COLOURS["base-tracing"], zorder=0, label="phase I")
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(result.t[0], result.t[-1]))
 

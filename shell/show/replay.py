@@ -9,6 +9,7 @@ import numpy as np
 from palpate.render.force_error import said
 from palpate.render.replay import ReplayResult
 from palpate.show import story as say
+from palpate.show.colours import COLOURS, colour_of
 from palpate.show.curve import solved_rows
 from palpate.show.page import file_words
 from palpate.show.quantities import ERROR
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from pyvista import Plotter
 
     from palpate.render.exact import ExactReplay
-
-MEASURED, RENDERED = "#a8bccb", "#c1121f"
 
 
 def story(result: ReplayResult) -> say.Story:
@@ -74,8 +73,16 @@ KEYS: tuple[say.Key, ...] = (
 
 def draw(result: ReplayResult, ax: Axes) -> None:
     """Both forces over time."""
-    ax.plot(result.t, result.recording.force_n, lw=1.6, color=MEASURED, label="measured")
-    ax.plot(result.t, np.linalg.norm(result.force_n, axis=1), lw=0.7, color=RENDERED, label=result.renderer)
+    ax.plot(
+        result.t, result.recording.force_n, lw=1.6, color=COLOURS["measured"], alpha=0.6, label="measured"
+    )
+    ax.plot(
+        result.t,
+        np.linalg.norm(result.force_n, axis=1),
+        lw=0.7,
+        color=colour_of(result.renderer),
+        label=result.renderer,
+    )
     counted = result.contact if result.contact.any() else np.ones_like(result.contact)
     most = max(result.recording.force_n[counted].max(), np.linalg.norm(result.force_n, axis=1).max())
     ax.set(

@@ -22,16 +22,12 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.render.base import Renderer
 from palpate.render.surface.felt_surface import felt_surface
+from palpate.show.colours import COLOURS
 from palpate.show.quantities import ShownQuantity
 
 if TYPE_CHECKING:
     import pyvista
     from matplotlib.axes import Axes
-
-PLAIN_COLOUR = "#ead7bf"
-TOUCH_COLOUR = "#c1121f"
-BASE_COLOUR = "#1d3557"
-
 
 AZIMUTH_DEG, ELEVATION_DEG = 35.0, 25.0
 SPREAD_M = 0.015
@@ -105,7 +101,7 @@ def draw_object(
     order = np.flatnonzero(front)[np.argsort(p[front][:, :, 2].mean(axis=1))]
     shade = 0.55 + 0.45 * np.clip(normal @ np.array([-0.35, 0.55, 0.76]), 0, 1)
     if colours is None:
-        colour = np.tile(to_rgb(PLAIN_COLOUR), (len(triangles), 1))
+        colour = np.tile(to_rgb(COLOURS["object"]), (len(triangles), 1))
     else:
         at = np.asarray(colours.values, dtype=float)[triangles].mean(axis=1)
         scale = Normalize(*(colours.limits or (float(np.nanmin(at)), float(np.nanmax(at)))))
@@ -122,13 +118,13 @@ def draw_object(
     if show_base:
         corners = mesh.linear()
         base = (corners.points[corners.fixed] - mesh.points.mean(axis=0)) @ view.T * 1e3
-        ax.scatter(base[:, 0], base[:, 1], s=16, color=BASE_COLOUR, label="fixed base", zorder=0.4)
+        ax.scatter(base[:, 0], base[:, 1], s=16, color=COLOURS["base"], label="fixed base", zorder=0.4)
     if touches is not None and len(touches):
         dots = (np.asarray(touches) - mesh.points.mean(axis=0)) @ view.T * 1e3
         visible = front[cKDTree(p.mean(axis=1)).query(dots)[1]]
-        ax.scatter(dots[~visible, 0], dots[~visible, 1], s=14, color=TOUCH_COLOUR, alpha=0.25, zorder=0.5)
+        ax.scatter(dots[~visible, 0], dots[~visible, 1], s=14, color=COLOURS["touch"], alpha=0.25, zorder=0.5)
         ax.scatter(
-            dots[visible, 0], dots[visible, 1], s=26, color=TOUCH_COLOUR, label="contact points",
+            dots[visible, 0], dots[visible, 1], s=26, color=COLOURS["touch"], label="contact points",
             edgecolors="white", linewidths=0.6, zorder=3,
         )  # fmt: skip
     ax.set_aspect("equal")
@@ -143,7 +139,6 @@ def draw_touched(ax: Axes, model: Model) -> None:
     ax.legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
 
 
-OBJECT_COLOUR, SUPPORT_COLOUR, TIP_COLOUR, ARROW_COLOUR = "#ead7bf", "#d9dee5", "#d95f02", "#1b4f9c"
 ARROW_M_PER_N = 0.03
 _LINE_POINTS = 20_000
 _BAR = {"n_labels": 2, "fmt": "%.3g", "color": "black", "title_font_size": 18, "label_font_size": 15}
@@ -210,7 +205,7 @@ def _add_surface(
     # shaded as a tip feels it, not by its triangles
     surface.point_data["normals"] = normals
     surface.point_data.active_normals_name = "normals"
-    look: dict[str, Any] = {"color": OBJECT_COLOUR}
+    look: dict[str, Any] = {"color": COLOURS["object"]}
     used = np.unique(triangles)
     if values is not None:
         surface[label] = np.asarray(values, dtype=float)
@@ -223,7 +218,7 @@ def _add_surface(
     middle, up = points[used].mean(axis=0), model.support.normal
     foot = middle - model.support.height(middle) * up
     plane = pyvista.Plane(center=foot, direction=up, i_size=size, j_size=size)
-    plotter.add_mesh(plane, color=SUPPORT_COLOUR, lighting=False)
+    plotter.add_mesh(plane, color=COLOURS["support"], lighting=False)
     _look_from(plotter, middle, up, size)
 
 
@@ -240,7 +235,7 @@ def add_dots(
     *,
     label: str = "",
     limits: tuple[float, float] | None = None,
-    colour: str = "#c1121f",
+    colour: str = COLOURS["touch"],
     colour_map: str = "viridis",
 ) -> None:
     """Small balls at points (k, 3) m, in one colour or by values (k,) named `label`; limits: of the
@@ -268,7 +263,7 @@ def add_path(
 
     kept = slice(None, None, max(1, len(points) // _LINE_POINTS))
     line = pyvista.lines_from_points(np.asarray(points, dtype=float)[kept])
-    look: dict[str, Any] = {"color": "#8a96a5"}
+    look: dict[str, Any] = {"color": COLOURS["path"]}
     if values is not None:
         line[label] = np.asarray(values, dtype=float)[kept]
         look = {"scalars": label, "cmap": "viridis", "scalar_bar_args": {"title": label, **_BAR}}
@@ -279,21 +274,27 @@ def add_tip(plotter: pyvista.Plotter, centre: np.ndarray, radius_m: float) -> No
     """The tool's tip, a ball with its centre (3,) m."""
     import pyvista
 
-    plotter.add_mesh(pyvista.Sphere(radius=radius_m, center=centre), color=TIP_COLOUR, specular=0.4)
+    plotter.add_mesh(pyvista.Sphere(radius=radius_m, center=centre), color=COLOURS["tip"], specular=0.4)
 
 
-def add_arrow(plotter: pyvista.Plotter, start: np.ndarray, along: np.ndarray, length_m: float) -> None:
+def add_arrow(
+    plotter: pyvista.Plotter,
+    start: np.ndarray,
+    along: np.ndarray,
+    length_m: float,
+    colour: str = COLOURS["next-touch"],
+) -> None:
     """An arrow from `start` (3,) m along a vector (3,)."""
     import pyvista
 
-    plotter.add_mesh(pyvista.Arrow(start=start, direction=along, scale=length_m), color=ARROW_COLOUR)
+    plotter.add_mesh(pyvista.Arrow(start=start, direction=along, scale=length_m), color=colour)
 
 
 def add_force(plotter: pyvista.Plotter, start: np.ndarray, force_n: np.ndarray) -> None:
     """A force (3,) N on the tool as an arrow of 30 mm a newton."""
     size = float(np.linalg.norm(force_n))
     if size > 0:
-        add_arrow(plotter, start, force_n, ARROW_M_PER_N * size)
+        add_arrow(plotter, start, force_n, ARROW_M_PER_N * size, COLOURS["fem"])
 
 
 def look_around(plotter: pyvista.Plotter, up: np.ndarray, points: np.ndarray) -> None:

@@ -11,6 +11,7 @@ from palpate.scenes.laboratory.paths import SIDEWAYS
 from palpate.scenes.laboratory.simulate import Simulation
 from palpate.show import recording as measured
 from palpate.show import story as say
+from palpate.show.colours import COLOURS
 from palpate.show.page import file_words, new_figure
 from palpate.show.quantities import DEPTH, ERROR, ORDER
 from palpate.show.view3d import Colouring, Line, Thing, Traces, View
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pyvista import Plotter
 
-_COLOURS = ("#c0392b", "#27ae60", "#2c6fbb")
 
 PRESSES_SHOWN = 7
 """Presses whose curves are drawn: more would hide one another."""
@@ -59,7 +59,7 @@ def story(result: Simulation) -> say.Story:
         lambda: view(result),
         say.Picture(
             lambda: simulation_figure(result),
-            "Path of the tip, force in time, the longest drag or touch, and some presses; grey and "
+            "Path of the tip, force in time, the longest drag or touch, and some presses; brown and "
             "dashed: the "
             "force of the ideal object under the same hand.",
         ),
@@ -77,7 +77,7 @@ def story(result: Simulation) -> say.Story:
             for name, size in sizes.items()
         ]
         heads = ["effect", "change of the force [mN]", "left with another modulus [mN]"]
-        yield say.Section("How large each effect is", [say.Rows(heads, rows)])
+        yield say.Section("How large is each effect?", [say.Rows(heads, rows)])
 
 
 KEYS: tuple[say.Key, ...] = (
@@ -118,14 +118,14 @@ def view(result: Simulation) -> View:
     read_m = depth_m + 1e-3 * ((read - motion.position[chosen]) * inward).sum(axis=1)
     lines = [
         Line("read", _turned(frame, recording.force_on_tool[chosen]), "measured", depth_m=read_m),
-        Line("without noise", _turned(frame, result.clean_n[chosen]), "found", False, read_m),
+        Line("without noise", _turned(frame, result.clean_n[chosen]), "effect", False, read_m),
     ]
     colourings = [
         Colouring(ORDER, None, np.arange(1.0, len(rows) + 1), "Each dot is a touch, in order of time."),
         Colouring(DEPTH, None, np.array([touch.depth for touch in result.touches]) * 1e-3),
     ]
     if result.ideal_n is not None:
-        lines.insert(1, Line("ideal object", _turned(frame, result.ideal_n[chosen]), "rendered"))
+        lines.insert(1, Line("ideal object", _turned(frame, result.ideal_n[chosen]), "simplest"))
         change = result.clean_n - result.ideal_n
         each = np.array([np.sqrt((change[r] ** 2).sum(axis=1).mean()) for r in rows])
     if result.ideal_n is not None and each.max() > _LEAST_CHANGE_N:
@@ -161,7 +161,7 @@ _BEFORE_MM = 1.0
 
 
 def simulation_figure(result: Simulation) -> Figure:
-    """Four panels: path, force in time, one touch, force against depth; grey and dashed is what the ideal
+    """Four panels: path, force in time, one touch, force against depth; brown and dashed is what the ideal
     object would answer to the same hand, where the simulation holds it.
     """
     figure = new_figure(13, 9, layout="constrained")
@@ -178,24 +178,30 @@ def simulation_figure(result: Simulation) -> Figure:
 def _path(ax, result: Simulation) -> None:
     motion = result.motion
     air = motion.touch < 0
-    ax.plot(*motion.position[:, [0, 2]].T, color="#b8c0cc", lw=0.4)
+    ax.plot(*motion.position[:, [0, 2]].T, color=COLOURS["path"], lw=0.4)
     traced = air & (np.linalg.norm(motion.trace_force, axis=1) > 0)
-    ax.plot(*motion.position[traced][:, [0, 2]].T, ".", color="#8e44ad", ms=1, label="on the support")
+    ax.plot(*motion.position[traced][:, [0, 2]].T, ".", color=COLOURS["base"], ms=1, label="on the support")
     pressed = (motion.touch >= 0) & ((motion.s > 0) | (motion.leg == SIDEWAYS))
-    ax.plot(*motion.position[pressed][:, [0, 2]].T, ".", color="#c0392b", ms=1, label="in contact")
+    ax.plot(*motion.position[pressed][:, [0, 2]].T, ".", color=COLOURS["touch"], ms=1, label="in contact")
     ax.set(xlabel="x [mm]", ylabel="z [mm]", title="path of the tip, seen along y", aspect="equal")
     ax.legend(loc="upper right", markerscale=6, fontsize=8)
 
 
 def _time(ax, result: Simulation) -> None:
     t = result.recording.t
-    ax.plot(t, np.linalg.norm(result.recording.force_on_tool, axis=1), color="#2c6fbb", lw=0.5, label="read")
+    ax.plot(
+        t,
+        np.linalg.norm(result.recording.force_on_tool, axis=1),
+        color=COLOURS["measured"],
+        lw=0.5,
+        label="read",
+    )
     if result.ideal_n is not None:
         difference = np.linalg.norm(result.clean_n - result.ideal_n, axis=1)
-        ax.plot(t, difference, color="#c0392b", lw=0.6, label="change of the force")
+        ax.plot(t, difference, color=COLOURS["change"], lw=0.6, label="change of the force")
     parts = [("trace", *result.motion.phase), *result.motion.beside]
     for k, (kind, start, end) in enumerate(parts):
-        ax.axvspan(start, end, color="#8e44ad" if k % 2 == 0 else "#16a085", alpha=0.12, lw=0)
+        ax.axvspan(start, end, color=COLOURS["base-tracing" if k == 0 else "interval"], alpha=0.7, lw=0)
         ax.text((start + end) / 2, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center", va="top",
                 fontsize=8, rotation=90)  # fmt: skip
     ax.set(xlabel="time [s]", ylabel="|force| [N]", title="force in time")
@@ -210,11 +216,11 @@ def _touch(ax, result: Simulation) -> None:
     number = int(np.where(drags, length + length.max(), length).argmax())
     rows = np.flatnonzero((motion.touch == number) & (motion.s > -6))
     t = result.recording.t[rows]
-    for i, colour in enumerate(_COLOURS):
+    for i, colour in enumerate(COLOURS[name] for name in "xyz"):
         ax.plot(t, result.recording.force_on_tool[rows, i], color=colour, lw=0.4, alpha=0.5)
         ax.plot(t, result.clean_n[rows, i], color=colour, lw=1.2, label=f"f{'xyz'[i]}")
         if result.ideal_n is not None:
-            ax.plot(t, result.ideal_n[rows, i], color="#7f8c8d", lw=1, ls="--")
+            ax.plot(t, result.ideal_n[rows, i], color=COLOURS["simplest"], lw=1, ls="--")
     touch = result.touches[number]
     title = f"touch {number}: {touch.kind}, {touch.depth:g} mm deep"
     ax.set(xlabel="time [s]", ylabel="force on the tool [N]", title=title)
@@ -238,10 +244,10 @@ def _curves(ax, result: Simulation) -> None:
         normal = result.touches[presses[k]].normal
         rows = np.flatnonzero((motion.touch == presses[k]) & (motion.s > -1.0))
         depth = motion.s[rows] + (motion.position[rows] - read[rows]) @ normal
-        ax.plot(depth, result.clean_n[rows] @ turn @ normal, color="#2c6fbb", lw=0.9)
+        ax.plot(depth, result.clean_n[rows] @ turn @ normal, color=COLOURS["measured"], lw=0.9)
         if result.ideal_n is not None:
             ideal = result.ideal_n[rows] @ turn @ normal
-            ax.plot(motion.s[rows], ideal, color="#7f8c8d", lw=1.0, ls="--")
+            ax.plot(motion.s[rows], ideal, color=COLOURS["simplest"], lw=1.0, ls="--")
     ax.set(
         xlabel="depth as read (ideal: true depth) [mm]",
         ylabel="force along the normal [N]",

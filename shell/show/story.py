@@ -15,7 +15,7 @@ A kind of result yields its blocks in order; each printer takes those that it ca
     Turned      -                             the object to be turned
     Next        its last lines                what to do now, marked
     Markup      -                             HTML as it is
-    Section     -                             a heading, and blocks under it
+    Section     -                             a chapter folded under its heading; inside one, a heading
 
 `on` keeps a block to one of the two. What a block holds may be a generator or a function: it runs when a
 printer comes to it, so that a terminal waits for no picture.
@@ -153,11 +153,13 @@ class Markup(OnPage):
 
 @dataclass(frozen=True)
 class Section(OnPage):
-    """heading: '' for none. evidence: which the page of what it is a part of leaves out."""
+    """heading: '' for none; on a page a question. evidence: which the page of what it is a part of leaves
+    out. unfolded: what is to be seen at once."""
 
     heading: str
     blocks: Iterable[Told]
     evidence: bool = False
+    unfolded: bool = False
 
 
 Story = Iterable[Told]

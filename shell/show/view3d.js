@@ -4,10 +4,9 @@
 const THREE = window.THREE;
 const RAD = Math.PI / 180;
 const FIELD_DEG = 28, LOWEST_DEG = -5, HIGHEST_DEG = 89, TURN_DEG = 8;
-const PALETTE = ["#8e5bd0", "#c2571a", "#0f8b8d", "#b5179e", "#6a994e", "#3a86ff", "#bc6c25", "#7b8794"];
+const UNNAMED = 8;  // of the table of colours, for curves that are compared once
 const NAMES = {into: "force into the surface [N]", sideways: "force sideways [N]",
   "into less": "less the measured force, into the surface [N]", "sideways less": "less the measured force, sideways [N]"};
-const FIXED = {measured: "var(--measured)", rendered: "var(--rendered)", found: "var(--found)"};
 
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
 const floats = text => new Float32Array(bytes(text));
@@ -152,7 +151,7 @@ function start(root) {
       mix.toArray(shade, 3 * k);
     }
     geometry.attributes.color.needsUpdate = true;
-    const unmarked = new THREE.Color(style("--dot"));
+    const unmarked = new THREE.Color(style("--touch"));
     for (let k = 0; k < count; k++) {
       const value = chosen.presses ? chosen.presses[k] : NaN;
       dots.setColorAt(k, Number.isFinite(value) ? chosen.ramp(share(value), mix) : unmarked);
@@ -218,7 +217,7 @@ function start(root) {
   // ---- one press: its numbers and its curve
   const curves = data.curves && {...data.curves, starts: whole(data.curves.starts), depth: floats(data.curves.depth),
     time: floats(data.curves.time), lines: data.curves.lines.map((line, k) => ({...line, into: floats(line.into), sideways: floats(line.sideways), depth: line.depth && floats(line.depth),
-      colour: FIXED[line.kind] || PALETTE[k % PALETTE.length]}))};
+      colour: style("--" + line.kind) ? `var(--${line.kind})` : `var(--unnamed-${k % UNNAMED})`}))};
   function select(k, told = true) {
     if (!(k >= 0 && k < count)) return;
     selected = k;

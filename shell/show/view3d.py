@@ -215,13 +215,13 @@ class Line:
     """A force along the presses, (n, 3) N on the tool in the local frame (outward normal, tangent, tangent),
     at each row (NaN: none).
 
-    kind: 'measured', 'rendered', 'found' (with what was found) or 'effect'. shown: from the start. depth_m:
-    (n,) where this line has depths of its own.
+    kind: a name of the table of colours (`show.colours`), or 'effect', which has none. shown: from
+    the start. depth_m: (n,) where this line has depths of its own.
     """
 
     name: str
     force_n: np.ndarray
-    kind: str = "rendered"
+    kind: str = "fem"
     shown: bool = True
     depth_m: np.ndarray | None = None
 

@@ -27,7 +27,9 @@ class BaseTracing:
         self._middle = base.mean(axis=0)
         up = model.support.normal
         self._axes = np.column_stack([level(up), np.cross(up, level(up))])
-        self._foot = cKDTree((_outline(model) - self._middle) @ self._axes)
+        self._points = _outline(model)
+        flat = (self._points - self._middle) @ self._axes
+        self._foot, self._sector = cKDTree(flat), _sector(flat)
         self._seen = np.zeros(SECTORS, dtype=bool)
         self.first: int | None = None
         self.last: int | None = None
@@ -44,10 +46,14 @@ class BaseTracing:
         at_foot, away = low[near], away[near]
         if not len(at_foot):
             return
-        sector = (np.arctan2(away[:, 1], away[:, 0]) / (2 * np.pi) * SECTORS).astype(int) % SECTORS
-        self._seen[sector] = True
+        self._seen[_sector(away)] = True
         self.first = int(numbers[at_foot[0]]) if self.first is None else self.first
         self.last = int(numbers[at_foot[-1]])
+
+    @property
+    def foot(self) -> tuple[np.ndarray, np.ndarray]:
+        """(k, 3) m, points along the foot, and (k,) whether the tip went past them."""
+        return self._points, self._seen[self._sector]
 
     @property
     def share(self) -> float:
@@ -58,6 +64,11 @@ class BaseTracing:
     def done(self) -> bool:
         """Enough to reconstruct the base from."""
         return self.share >= ENOUGH
+
+
+def _sector(flat: np.ndarray) -> np.ndarray:
+    """(n,) number of the direction in which (n, 2) lie."""
+    return (np.arctan2(flat[:, 1], flat[:, 0]) / (2 * np.pi) * SECTORS).astype(int) % SECTORS
 
 
 def _outline(model: Model) -> np.ndarray:

@@ -7,6 +7,8 @@ The live plots under the picture: force and depth of the last seconds.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pyvista
 from vtkmodules.vtkRenderingCore import (
@@ -17,8 +19,8 @@ from vtkmodules.vtkRenderingCore import (
     vtkTextActor,
 )
 
+from palpate.show.colours import COLOURS, GREY, colour_of
 from palpate.window.lettering import set_type
-from palpate.window.widgets import ACCENT, GREY, SECOND
 
 
 class ForceTrace:
@@ -49,7 +51,7 @@ class ForceTrace:
 
 LENGTH, ROOM = 26.0, 12.0
 """Of an axis, and between letters, pixels of a window of full size."""
-COLOURS = {"x": "#b3261e", "y": "#2e7d32", "z": "#1b4f9c"}
+AXES = {name: COLOURS[name] for name in "xyz"}
 
 
 class AxesGizmo:
@@ -60,7 +62,7 @@ class AxesGizmo:
         self._lines = pyvista.PolyData()
         self._lines.points = np.zeros((6, 3))
         self._lines.lines = np.array([[2, 0, 1], [2, 2, 3], [2, 4, 5]]).ravel()
-        shades = [[*pyvista.Color(colour).int_rgb, 255] for colour in COLOURS.values()]
+        shades = [[*pyvista.Color(colour).int_rgb, 255] for colour in AXES.values()]
         self._lines.GetCellData().SetScalars(
             pyvista.convert_array(np.array(shades, dtype=np.uint8), name="shade")
         )
@@ -73,8 +75,8 @@ class AxesGizmo:
         actor.SetMapper(mapper)
         actor.GetProperty().SetLineWidth(2.0)
         renderer.AddViewProp(actor)
-        self.letters = [vtkTextActor() for _ in COLOURS]
-        for letter, (name, colour) in zip(self.letters, COLOURS.items(), strict=True):
+        self.letters = [vtkTextActor() for _ in AXES]
+        for letter, (name, colour) in zip(self.letters, AXES.items(), strict=True):
             letter.SetInput(name)
             set_type(letter.GetTextProperty(), 12, True, colour)
             letter.GetTextProperty().SetJustificationToCentered()
@@ -104,7 +106,6 @@ class AxesGizmo:
 
 LEAST_N, LEAST_MM = 0.5, 2.0
 """What the axes reach at least."""
-DEPTH_COLOUR = "#2e7d32"
 
 
 class LiveCharts:
@@ -116,10 +117,10 @@ class LiveCharts:
         nothing = np.zeros(2), np.zeros(2)
         self._lines = [
             self._force.line(*nothing, color=colour, width=2.0, style=style)
-            for colour, style in ((ACCENT, "-"), (SECOND, "--"))
+            for colour, style in ((COLOURS["fem"], "-"), (COLOURS["hunt-crossley"], "--"))
         ]
-        self._deep = self._depth.line(*nothing, color=DEPTH_COLOUR, width=2.0)
-        self.tell(1)
+        self._deep = self._depth.line(*nothing, color=COLOURS["depth"], width=2.0)
+        self.tell(["fem"])
 
     @staticmethod
     def _chart(
@@ -134,11 +135,13 @@ class LiveCharts:
         plotter.add_chart(chart)
         return chart
 
-    def tell(self, count: int) -> None:
-        """How many forces are drawn, in the colours in which the panel says them."""
-        self._told = count
-        for line in self._lines[count:]:
+    def tell(self, names: Sequence[str]) -> None:
+        """Whose forces are drawn, each in its renderer's colour; what is felt first."""
+        self._told = len(names)
+        for line in self._lines[len(names) :]:
             line.visible = False
+        for line, name in zip(self._lines, names, strict=False):
+            line.color = colour_of(name)
 
     def update(self, trace: ForceTrace) -> None:
         """Redraw from the trace; the range grows with the greatest value shown."""

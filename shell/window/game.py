@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.mechanics.model.material import Ball
-from palpate.words import mm
+from palpate.words import mm, renderer_words
 
 HALF_TIME_S = 60.0
 PRESS_M = 0.008
@@ -78,14 +78,16 @@ class Game:
             last = self.answers[-1]
             first = (
                 f"{mm(last.off_m, '.1f')} from the nodule after {last.seconds:.0f} s by "
-                f"{last.renderer}: {last.score:.0f} of 100 points. Touch anew to go on; Tab: next renderer."
+                f"{renderer_words(last.renderer)}: {last.score:.0f} of 100 points. Touch anew to go on; Tab: "
+                "next renderer."
             )
         else:
             deep = mm(PRESS_M, "g")
             first = f"A nodule is hidden: press {deep} deep at many places, and compare the N/m above."
         names = sorted({a.renderer for a in self.answers})
         scores = [
-            f"{name} {np.mean([a.score for a in self.answers if a.renderer == name]):.0f} of 100 points in "
+            f"{renderer_words(name)} "
+            f"{np.mean([a.score for a in self.answers if a.renderer == name]):.0f} of 100 points in "
             f"{sum(a.renderer == name for a in self.answers)}"
             for name in names
         ]

@@ -1,7 +1,5 @@
 """The ghost tip: where the suggested press begins, and how deep it goes.
 
-Whether a session traced an object's base: the tip went all around it along its foot, on the support.
-
 Guidance in the touch window: the servo's ticks are cut into segments, a ghost tip shows the suggestion.
 
 The person does as he likes: what was done counts. A segment ends where the tip has been in the air for a
@@ -21,6 +19,7 @@ from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Sugge
 from palpate.diagnosis.explore.segments import Segment
 from palpate.mechanics.model.model import Model
 from palpate.servo import Servo
+from palpate.show.colours import COLOURS
 from palpate.window.base_tracing import BaseTracing
 from palpate.window.picture import arrow_matrix
 from palpate.window.worker import Worker
@@ -36,7 +35,7 @@ class Ghost:
     depth_m: float
 
 
-COLOUR = "#1a9850"
+COLOUR = COLOURS["next-touch"]
 STAFF_M = 0.03
 """Of the staff along which the tip comes."""
 
@@ -104,6 +103,7 @@ class Guide:
         self._last_touch: int | None = None
         self._suggestion: Suggestion = explorer.suggest()
         self._state: ExplorationState = explorer.state
+        self._touched = np.zeros((0, 3))
 
     @property
     def suggestion(self) -> Suggestion:
@@ -122,6 +122,16 @@ class Guide:
         if s.kind != "press" or s.point is None or s.normal is None:
             return None
         return Ghost(s.point + self._servo.tip_radius_m * s.normal, -s.normal, s.depth_m)
+
+    @property
+    def foot(self) -> tuple[np.ndarray, np.ndarray]:
+        """(k, 3) m, points along the foot, and (k,) whether they were gone round."""
+        return self._tracing.foot
+
+    @property
+    def touched(self) -> np.ndarray:
+        """(p, 3) m, where a press met the object, of those that were understood."""
+        return self._touched
 
     def follow(self) -> None:
         """Take over the servo's newest ticks; hand a segment over where one has ended."""
@@ -173,6 +183,8 @@ class Guide:
         self.explorer.bring_up_to_date()
         self.explorer.save(self._path)
         self._state, self._suggestion = self.explorer.state, self.explorer.suggest()
+        if (found := self.explorer.estimate.exploration) is not None:
+            self._touched = found.presses.point
         if self._suggestion.kind == "retrace":
             self._tracing = BaseTracing(self._model)
 
@@ -187,7 +199,7 @@ class Guide:
         return asked if self._still_tracing else "press"
 
     def lines(self) -> list[str]:
-        """For the panel: what to do, and what is known."""
+        """For the panel: what to do, in one sentence, and what is known."""
         s, state = self._suggestion, self._state
         why = state.trouble.split(" (")[0].split(":")[0]
         known = f"no shape yet: {why}" if why else "nothing is known yet"
@@ -199,7 +211,7 @@ class Guide:
             )
         what = WHAT.get(s.kind, "")
         if self._still_tracing:
-            what += f" ({100 * self._tracing.share:.0f} % traced)"
+            what += f" ({100 * self._tracing.share:.0f} % traced): the red part is missing"
         if s.kind == "press":
-            what = f"press at the ghost, {mm(s.depth_m, '.0f')} deep"
-        return [f"{what}: {s.why}", known]
+            what = f"press at the green ghost, {mm(s.depth_m, '.0f')} deep"
+        return [what, known]

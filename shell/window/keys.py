@@ -21,27 +21,35 @@ from palpate.window.worker import level
 
 @dataclass(frozen=True)
 class KeyBinding:
-    """does: for help and a button's tip. button: its words, '' for a key without a button."""
+    """does: for help and a button's tip. button: its words, '' for a key without a button. group: of buttons,
+    in which it stands. rare: folded away until all are asked for."""
 
     does: str
     button: str = ""
+    group: str = "Session"
+    rare: bool = False
 
 
 KEYS: dict[str, KeyBinding] = {
-    "Return": KeyBinding("The nodule is where the tip is", "It is here"),
-    "b": KeyBinding("Show a second renderer under the same tip, or only what you feel", "Side by side"),
-    "Tab": KeyBinding("Feel the next renderer", "Next renderer"),
-    "c": KeyBinding("Colour by the stiffness at the depth of a press, or by displacement", "Stiffness map"),
-    "i": KeyBinding("Put a stiff ball under the tip, or take it out", "Stiff ball"),
+    "Return": KeyBinding("The nodule is where the tip is", "It is here", "Touch"),
+    "b": KeyBinding(
+        "Show a second renderer under the same tip, or only what you feel", "Side by side", "Touch"
+    ),
+    "Tab": KeyBinding("Feel the next renderer", "Next renderer", "Touch", rare=True),
+    "c": KeyBinding(
+        "Colour by the stiffness at the depth of a press, or by displacement", "Stiffness map", "Look"
+    ),
+    "i": KeyBinding("Put a stiff ball under the tip, or take it out", "Stiff ball", "Touch"),
     "r": KeyBinding("Record what you do; again: write the recording", "Record"),
-    "p": KeyBinding("Save this window as a picture", "Save picture"),
-    "v": KeyBinding("Look from where you began", "First view"),
-    "space": KeyBinding("Switch the device's force on or off", "Force"),
-    "s": KeyBinding("Renderer, friction, stiffness, depth, effects", "Settings"),
+    "p": KeyBinding("Save this window as a picture", "Save picture", "Look", rare=True),
+    "v": KeyBinding("Look from where you began", "First view", "Look"),
+    "space": KeyBinding("Switch the device's force on or off", "Force", "Touch"),
+    "s": KeyBinding("Renderer, friction, stiffness, depth, effects", "Settings", "Touch"),
     "h": KeyBinding("What mouse and keys do", "Help"),
     "g": KeyBinding("Leave this object and choose another", "Scenes"),
     "Escape": KeyBinding("Close Settings or Help"),
     "q": KeyBinding("Force off, and close the window", "Quit"),
+    "m": KeyBinding("Show all buttons, or fold the rarer ones away", "More"),
     "plus": KeyBinding("Stiffer by a quarter"),
     "minus": KeyBinding("Softer by a fifth"),
     "bracketleft": KeyBinding("Press less deep"),

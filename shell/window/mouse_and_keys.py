@@ -53,6 +53,11 @@ class Controlled(Protocol):
     boards: list[Board]
     notice: str
     aside: str
+    more: bool
+
+    @property
+    def guided(self) -> bool:
+        """Whether an exploration is guided: what is explored is left as it is."""
 
     @property
     def picture_renderers(self) -> list[vtkRenderer]:
@@ -220,9 +225,9 @@ class Controls:
         missing = {
             "space": session.has_force,
             "f": session.feels_inside,
-            "i": session.feels_inside and self._window.game is None,
+            "i": session.feels_inside and self._window.game is None and not self._window.guided,
             "arrows": session.inclusion is not None and self._window.game is None,
-            "Return": self._window.game is not None,
+            "Return": self._window.game is not None and not self._window.guided,
             "Escape": bool(self._window.aside),
             "c": self._window.game is None or self._window.game.answered,  # a map would show the nodule
         }
@@ -254,6 +259,7 @@ class Controls:
             "p": self._save_picture,
             "Escape": lambda: window.show_aside(window.aside),
             "h": lambda: window.show_aside("h"),
+            "m": self._toggle_more,
             "s": lambda: window.show_aside("s"),
             "g": lambda: window.close(scenes=True),
             "q": window.close,
@@ -272,6 +278,9 @@ class Controls:
             self._window.notice = f"wrote {self._session.end_recording()}"
         else:
             self._session.begin_recording(Path(f"{_stamp()}.csv.gz"))
+
+    def _toggle_more(self) -> None:
+        self._window.more = not self._window.more
 
     def _save_picture(self) -> None:
         path = f"{_stamp()}.png"

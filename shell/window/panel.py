@@ -11,16 +11,16 @@ import numpy as np
 
 from palpate.render.registry import names
 from palpate.scenes.scene import Scene
+from palpate.show.colours import ACCENT, GREY, HINT, WARNING, colour_of
 from palpate.window.keys import KEYS, help_rows, shown
 from palpate.window.mouse_and_keys import Controlled, Controls
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
-from palpate.window.session import FRICTIONS, MODULUS_STEP
-from palpate.window.widgets import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
+from palpate.window.session import FRICTIONS, MODULUS_STEP, TouchSession
+from palpate.window.widgets import BODY, Item, Row
 from palpate.window.worker import Frame
-from palpate.words import begun, mm, spaced
+from palpate.words import begun, mm, renderer_words, spaced
 
 T = TypeVar("T")
-WARNING = "#b3261e"
 DRAGGED_M = 0.006
 DEPTH = "press depth"
 """The slider's name."""
@@ -40,6 +40,10 @@ class Shown(Controlled, Protocol):
 
     def next_words(self, frame: Frame) -> str:
         """What to do next."""
+
+    @property
+    def known_words(self) -> str:
+        """What a guided exploration knows so far, '' without one."""
 
 
 class NextStep:
@@ -64,7 +68,7 @@ class NextStep:
         if not mouse:
             steps = [("Move the device until the tip touches.", touching)]
         if not session.beside_name:
-            both = "Side by side: feel one renderer, see another."
+            both = "Side by side: feel one model, see another."
             steps.append((both, lambda _: bool(session.beside_name)))
         if window.game is None:
             ball = "Stiff ball puts one under the tip: press there again."
@@ -88,17 +92,18 @@ def main_rows(window: Shown, frame: Frame) -> list[Row]:
     session = window.session
     felt, *others = frame.views
     inside = [f"{session.young_modulus_pa / 1000:.1f} kPa", friction_words(session.friction)]
-    about = f"felt: {felt.name}"
+    about = f"felt: {renderer_words(felt.name)}"
     if session.feels_inside:
         about = ", ".join([about, *inside])
     rows: list[Row] = [
         (Item(window.scene.title, size=16, bold=True),),
-        (Item(about, size=12, colour=GREY),),
-        (Item(f"{np.linalg.norm(felt.force_n):.2f} N", size=46, bold=True, colour=ACCENT),),
+        (Item(about, size=12, colour=GREY, tip=_about_tip(felt.name, session)),),
+        (Item(f"{np.linalg.norm(felt.force_n):.2f} N", size=46, bold=True, colour=colour_of(felt.name)),),
     ]
     # its row is there without it too: no button moves away from under the mouse
-    second = "".join(f"{np.linalg.norm(v.force_n):.2f} N  {v.name}" for v in others)
-    rows.append((Item(second, size=17, bold=True, colour=SECOND),))
+    second = "".join(f"{np.linalg.norm(v.force_n):.2f} N  {renderer_words(v.name)}" for v in others)
+    called, colour = (others[0].name, colour_of(others[0].name)) if others else ("", GREY)
+    rows.append((Item(second, size=15, bold=True, colour=colour, tip=called),))
     rows += [
         (Item(_where(frame), size=12, colour=GREY),),
         (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=2),),
@@ -138,6 +143,7 @@ def _buttons(window: Shown) -> list[Row]:
         "r": session.recording is not None,
         "s": window.aside == "s",
         "h": window.aside == "h",
+        "m": window.more,
     }
     buttons = {
         name: Item(
@@ -147,10 +153,14 @@ def _buttons(window: Shown) -> list[Row]:
             on=chosen.get(name, False),
         )
         for name, key in KEYS.items()
-        if key.button and name in offered
+        if key.button and name in offered and (window.more or not key.rare)
     }
     first = buttons.pop("Return", None)
-    return [*([(first,)] if first else []), *_grid(list(buttons.values()))]
+    rows: list[Row] = [(first,)] if first else []
+    for group in dict.fromkeys(KEYS[name].group for name in ("b", "c", "r")):
+        of_group = [button for name, button in buttons.items() if KEYS[name].group == group]
+        rows += [*_title(group), *_grid(of_group)] if of_group else []
+    return rows
 
 
 def _status(window: Shown, frame: Frame) -> list[Row]:
@@ -166,7 +176,18 @@ def _status(window: Shown, frame: Frame) -> list[Row]:
     if session.recording is not None:
         traced = f"base traced {100 * session.recording.traced:.0f} %"
         rows.append((Item(f"Recording {frame.recorded_s or 0.0:.0f} s, {traced}", size=12, colour=WARNING),))
-    return [*rows, *((Item(word, size=12, colour=GREY),) for word in (frame.reason, window.notice) if word)]
+    said = (window.known_words, frame.reason, window.notice)
+    return [*rows, *((Item(word, size=12, colour=GREY),) for word in said if word)]
+
+
+def _about_tip(name: str, session: TouchSession) -> str:
+    """What the line says in the field's terms."""
+    if not session.feels_inside:
+        return name
+    return (
+        f"{name}; Young's modulus {session.young_modulus_pa / 1000:.1f} kPa; the tip slides where the force "
+        "along the surface exceeds the friction coefficient times the force into it"
+    )
 
 
 def friction_words(friction: float) -> str:
@@ -189,14 +210,22 @@ def _grid(items: Sequence[Item], columns: int = 2) -> list[Row]:
 
 def _choices(chosen: T, every: Sequence[tuple[str, T]], do: Callable[[T], object]) -> list[Item]:
     """A button each; the one that holds now is marked."""
-    return [Item(words, do=partial(do, value), on=value == chosen, size=12) for words, value in every]
+    return [
+        Item(words, do=partial(do, value), on=value == chosen, size=12, tip=_technical(words, value))
+        for words, value in every
+    ]
+
+
+def _technical(words: str, value: object) -> str:
+    """A renderer's name by which commands know it."""
+    return value if isinstance(value, str) and value not in ("", words) else ""
 
 
 def settings_rows(window: Shown) -> list[Row]:
     """The column on the right: everything that may be changed about what is felt."""
     session = window.session
 
-    renderers = [(name, name) for name in names()]
+    renderers = [(renderer_words(name), name) for name in names()]
     rows = [
         *_title("What you feel"),
         *_grid(_choices(session.renderer_name, renderers, session.set_renderer), 1),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any
 
 import numpy as np
 import pyvista
@@ -15,10 +15,10 @@ from palpate.render.base import Renderer
 from palpate.render.press import BESIDE
 from palpate.render.support import support_plane
 from palpate.scenes.phantoms import Region
+from palpate.show.colours import COLOURS, INK, colour_of
 from palpate.window import shadow
 from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
-from palpate.window.widgets import INK
 from palpate.window.worker import Frame, RendererView
 from palpate.words import mm
 
@@ -27,9 +27,9 @@ LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 SPREAD = 2
-TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
 
-Colours = Literal["viridis", "YlOrRd"]
+FAR = [COLOURS["object"], COLOURS["fem"], COLOURS["displaced"]]
+"""Of displacement: where nothing moves the object has its own colour."""
 
 
 class ObjectPicture:
@@ -65,17 +65,18 @@ class ObjectPicture:
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
             smooth_shading=True,
-            color=TIP_COLOUR,
+            color=COLOURS["tip"],
             ambient=0.35,
             specular=0.4,
         )
         self._arrow = plotter.add_mesh(
-            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR, ambient=0.6
+            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08),
+            ambient=0.6,
         )
         self._ball = plotter.add_mesh(
             pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20),
             smooth_shading=True,
-            color=INCLUSION_COLOUR,
+            color=COLOURS["inclusion"],
         )
         self._ball.SetVisibility(False)
         self._inside: Region | None = None
@@ -87,6 +88,10 @@ class ObjectPicture:
         self._shadow.SetVisibility(False)
         self.colour_by_displacement()
 
+    def is_of(self, name: str) -> None:
+        """Whose force the arrow is: it has that renderer's colour."""
+        self._arrow.prop.color = colour_of(name)
+
     @property
     def rest_surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, 3) m and triangles (k, 3) of the undeformed surface."""
@@ -95,7 +100,7 @@ class ObjectPicture:
     def colour_by_displacement(self) -> None:
         """As far as each point has moved, mm."""
         self.by_stiffness = False
-        self._colour_by("displacement (mm)", "YlOrRd", DISPLACEMENT_RANGE_MM)
+        self._colour_by("displacement (mm)", _ramp(FAR), DISPLACEMENT_RANGE_MM)
 
     def colour_by_stiffness(
         self, stiffness_n_per_m: np.ndarray, limits: tuple[float, float], depth_m: float
@@ -107,7 +112,7 @@ class ObjectPicture:
         self._surface[name] = stiffness_n_per_m
         self._colour_by(name, "viridis", limits)
 
-    def _colour_by(self, name: str, colours: Colours, limits: tuple[float, float]) -> None:
+    def _colour_by(self, name: str, colours: Any, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
         opacity, culling = 1.0, "none"
         if self._actor is not None:
@@ -183,6 +188,13 @@ class ObjectPicture:
         if size > LEAST_ARROW_N:
             start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
             self._arrow.SetUserMatrix(arrow_matrix(start, force, ARROW_M_PER_N * size))
+
+
+def _ramp(stops: list[str]) -> Any:
+    """A map through these colours."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    return LinearSegmentedColormap.from_list("displacement", stops)
 
 
 def _spread(normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:

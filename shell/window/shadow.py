@@ -10,8 +10,9 @@ import pyvista
 from scipy.spatial import ConvexHull, QhullError
 
 from palpate.mechanics.frames import tangents
+from palpate.show.colours import COLOURS
 
-FLOOR_COLOUR = np.array([217, 222, 229], dtype=float)
+FLOOR_COLOUR = np.array([int(COLOURS["support"][k : k + 2], 16) for k in (1, 3, 5)], dtype=float)
 DARKEST = 0.5
 _DIRECTIONS, _ANGLES, _NEAR_RINGS, _FAR_RINGS = 96, 72, 28, 12
 

@@ -6,23 +6,25 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import pyvista
 from vtkmodules.vtkInteractionStyle import vtkInteractorStyleUser
+from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 
 from palpate.mechanics.errors import PalpateError
 from palpate.mechanics.progress import Progress
 from palpate.mechanics.recording.recording import read_recording
+from palpate.scenes.build import kept_surface
 from palpate.scenes.embedded import embedded_recording
 from palpate.scenes.phantoms import phantom
 from palpate.scenes.scene import Scene
-from palpate.window.widgets import GREY, HINT, PAPER, Board, Item
+from palpate.show.colours import COLOURS, GREY, HINT, PAPER, STAGE
+from palpate.window.widgets import Board, Item
 
 T = TypeVar("T")
 PERIOD_S = 0.05
 SIZE = (1280, 800)
-BACKGROUND, OBJECT = "#f4f6f8", "#d9b96a"
 COLUMNS = 3
 SPACE, HEAD, PICTURE = 16, 76, 250
 """Between cards, above them, and the height of a card's picture, pixels of a window of full size."""
@@ -72,7 +74,7 @@ class WaitingWindow:
             title="Palpate",
         )
         base, *self._views = self.plotter.renderers
-        base.set_background(BACKGROUND)
+        base.set_background(STAGE)
         base.viewport = (0.0, 0.0, 1.0, 1.0)
         self.head = Board(base)
         self.cards = [Board(base, fill=PAPER) for _ in scenes]
@@ -200,13 +202,28 @@ class WaitingWindow:
 
 
 def _draw(plotter: pyvista.Plotter, scene: Scene) -> None:
-    """A scene's object, or where the tip went in its recording."""
-    if scene.kind == "phantom":
-        shape = phantom(scene.source)
-        surface = pyvista.PolyData.from_regular_faces(shape.vertices, shape.faces)
-        plotter.add_mesh(surface, color=OBJECT, smooth_shading=True, split_sharp_edges=True, ambient=0.2)
-    else:
+    """A scene's object as it is touched; of a recording without a model so far, where the tip went."""
+    surface = _surface_of(scene)
+    if surface is None:
         path = read_recording(embedded_recording(scene.source)).position[::EVERY]
-        plotter.add_points(path, color=OBJECT, point_size=2.0)
+        plotter.add_points(path, color=COLOURS["object"], point_size=2.0)
+    else:
+        look: dict[str, Any] = {"smooth_shading": True, "split_sharp_edges": True, "ambient": 0.2}
+        plotter.add_mesh(surface, color=COLOURS["object"], **look)
     plotter.camera_position = "xz"
     plotter.camera.elevation = 30.0
+
+
+def _surface_of(scene: Scene) -> pyvista.PolyData | None:
+    if scene.kind == "phantom":
+        shape = phantom(scene.source)
+        return pyvista.PolyData.from_regular_faces(shape.vertices, shape.faces)
+    kept = kept_surface(scene)
+    if kept is None:
+        return None
+    reader = vtkXMLPolyDataReader()
+    reader.ReadFromInputStringOn()
+    reader.SetInputString(kept.decode("latin-1"))
+    reader.Update()
+    read: Any = pyvista.wrap(reader.GetOutput())
+    return read

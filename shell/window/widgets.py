@@ -21,10 +21,9 @@ from vtkmodules.vtkRenderingCore import (
     vtkTextActor,
 )
 
+from palpate.show.colours import ACCENT, BUTTON, INK, NIGHT, OVER, PAPER
 from palpate.window.lettering import cut, set_type, text_width, wrapped
 
-INK, GREY, ACCENT, SECOND = "#1c2430", "#667080", "#1b4f9c", "#d98c00"
-PAPER, BUTTON, OVER, HINT, NIGHT = "#ffffff", "#e9edf3", "#d3dded", "#e8f0fb", "#2b3442"
 BODY = 13
 """Size of type in pixels, of a window of full size."""
 MARGIN, GAP, BUTTON_HEIGHT, SLIDER_HEIGHT, LINE = 14, 6, 30, 20, 1.32
@@ -224,15 +223,18 @@ class Board:
         """Whether the pixel is on the board."""
         return _within(self._rectangle, x, y)
 
-    def _at(self, x: float, y: float) -> int | None:
+    def _at(self, x: float, y: float, *, told: bool = False) -> int | None:
+        """What can be pressed here; told: or says what it is."""
         found = (
-            k for k, (item, at) in enumerate(self.placed) if (item.do or item.slide) and _within(at, x, y)
+            k
+            for k, (item, at) in enumerate(self.placed)
+            if (item.do or item.slide or (told and item.tip)) and _within(at, x, y)
         )
         return next(found, None)
 
     def hover(self, x: float, y: float) -> None:
-        """The mouse is here: a button lights up and says what it does."""
-        over = self._at(x, y)
+        """The mouse is here: a button lights up and says what it does, words what they are called."""
+        over = self._at(x, y, told=True)
         if over != self._over:
             self._over = over
             self.show(self._rows)

@@ -20,18 +20,21 @@ from palpate.devices.channel import PoseChannel
 from palpate.mechanics.disk.writing import PNG, atomic_file
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene
+from palpate.show.colours import PAPER, STAGE
 from palpate.window.charts import AxesGizmo, LiveCharts
 from palpate.window.game import PRESS_M, Game
 from palpate.window.guide import GhostTip
 from palpate.window.keys import Orbit
+from palpate.window.known import KnownSoFar
 from palpate.window.mouse_and_keys import Controls
 from palpate.window.panel import NextStep, aside_rows, main_rows
 from palpate.window.picture import ObjectPicture
 from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
-from palpate.window.widgets import PAPER, Board, Item
+from palpate.window.widgets import Board, Item
 from palpate.window.worker import Frame, Pace, RendererView, level
+from palpate.words import begun, renderer_words, sentence
 
 if TYPE_CHECKING:
     from palpate.window.guide import Guide
@@ -41,7 +44,6 @@ SIZE = (1280, 800)
 COLUMN, CHARTS = 280, 190
 """Width of the columns beside the pictures and height of the plots, pixels of a window of full size."""
 LEAST_SCALE, MOST_SCALE = 0.55, 2.5
-BACKGROUND = "#f4f6f8"
 LIGHTS = (((-0.4, 0.55, 1.0), 0.9), ((0.9, -0.1, 0.6), 0.45))
 """Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
 
@@ -70,6 +72,7 @@ class TouchWindow:
         self.frames = 0
         self.closed = self.another = self._ended = False
         self.notice = self.aside = ""
+        self.more = False
         self.moved_by_mouse = channel is not None
         self._channel = channel
         self._last_s = time.perf_counter()
@@ -78,7 +81,7 @@ class TouchWindow:
         self._map = StiffnessMap(session.worker, session.servo.tip_radius_m)
         nodules = tuple(session.model.material.inclusions.values())
         up = session.model.support.normal
-        self.game = Game(nodules, up) if scene.find and nodules else None
+        self.game = Game(nodules, up) if scene.find and nodules and guide is None else None
         self.coloured = scene.colour == "stiffness"
         self.plotter = self._plotter(off_screen, size)
         self._first, self._second, self._plots, self._column, self._aside = self.plotter.renderers
@@ -90,6 +93,7 @@ class TouchWindow:
         self._names: tuple[str, ...] = ()
         self.pictures = [self._picture(0, session.renderer_name)]
         self._ghost = GhostTip(self.plotter, session.servo.tip_radius_m) if guide else None
+        self._known = KnownSoFar(self.plotter)
         self._axes = AxesGizmo(self._first)
         self.plotter.subplot(0, 2)
         self._charts = LiveCharts(self.plotter, session.trace.seconds)
@@ -113,7 +117,7 @@ class TouchWindow:
             lighting="none",
         )
         for renderer in plotter.renderers:
-            renderer.set_background(BACKGROUND)
+            renderer.set_background(STAGE)
             # blending in any order takes several passes over the whole picture; a shadow needs one
             renderer.UseOITOff()
         # smoothing edges costs more than all the rest where there is no graphics card
@@ -121,6 +125,11 @@ class TouchWindow:
         assert window is not None, "a plotter has one until it is closed"
         window.SetMultiSamples(0)
         return plotter
+
+    @property
+    def guided(self) -> bool:
+        """Whether an exploration is guided."""
+        return self.guide is not None
 
     @property
     def sides(self) -> int:
@@ -166,7 +175,9 @@ class TouchWindow:
         if self.coloured:
             self._map.forget()
         self._names = names
-        self._charts.tell(len(names))
+        self._charts.tell(names)
+        for picture, name in zip(self.pictures, names, strict=False):
+            picture.is_of(name)
 
     def _lay_out(self) -> None:
         """Everything in its place, where the window, or what is open in it, has changed."""
@@ -273,6 +284,7 @@ class TouchWindow:
         if self.guide is not None and self._ghost is not None:
             self.guide.follow()
             self._ghost.show(self.guide.ghost)
+            self._known.show(self.guide)
         self._axes.update(self._scale)
         if words:
             self._write(frame)
@@ -289,16 +301,21 @@ class TouchWindow:
         column.show(main_rows(self, frame))
         aside.show(aside_rows(self) if self.aside else [])
         for side, (board, name) in enumerate(zip(self._headings, self._names, strict=False)):
-            board.show([(Item(f"{name}: {'for comparison' if side else 'what is felt'}", bold=True),)])
+            what = "for comparison" if side else "what is felt"
+            board.show([(Item(f"{begun(renderer_words(name))}: {what}", bold=True),)])
 
     def next_words(self, frame: Frame) -> str:
         """What to do next: one thing at a time."""
         if self.guide is not None and self.guide.suggestion.kind != "stop":
-            return "\n".join(self.guide.lines())
-        lines = [] if self.guide is None else self.guide.lines()
+            return sentence(self.guide.lines()[0])
         if self.game is not None:
-            return "\n".join([*lines, *self.game.lines(time.perf_counter())])
-        return "\n".join(lines) if lines else self._next.line(frame)
+            return "\n".join(self.game.lines(time.perf_counter()))
+        return self._next.line(frame) if self.guide is None else sentence(self.guide.lines()[0])
+
+    @property
+    def known_words(self) -> str:
+        """What a guided exploration knows so far, '' without one."""
+        return "" if self.guide is None else self.guide.lines()[1]
 
     def run(
         self,

@@ -23,9 +23,10 @@ from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.presses.gap_bins import gap_by_bin
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.show.demo import diagnosis_json, diagnosis_words
+from palpate.show.diagnosis.gaps import press_gaps
 from palpate.show.diagnosis.parameters import parameter_rows, short
-from palpate.show.diagnosis.words import verdict
-from palpate.words import spoken
+from palpate.show.diagnosis.words import verdict, where
+from palpate.words import force_words, spoken
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
 
@@ -296,6 +297,19 @@ def test_the_page_says_what_to_do_and_its_view_switches_effects_on(
         off, before = (np.abs(x.force_n - measured.force_n)[counted].mean() for x in (better, simulated))
         assert off < 0.7 * before
     assert not any(line.shown for line in effects)
+
+
+def test_the_press_that_is_shown_has_one_number(delayed):
+    """The words gave the place's, over several presses, the view the press's own."""
+    result = delayed[2]
+    gaps = press_gaps(result)
+    site_rmse = np.where(np.arange(len(result.where.site_rmse)) == result.where.site_rmse.argmax(), 9.0, 0.0)
+    *there, _ = result.where.worst[0]
+    where_ = dataclasses.replace(result.where, site_rmse=site_rmse, worst=[(*there, 9.0)])
+    changed = dataclasses.replace(result, where=where_, gap_before_n=0.0)
+    view = changed.view()
+    assert view.colourings[0].presses[view.selected] == gaps[view.selected]
+    assert f"(the press shown): {force_words(gaps[view.selected])}" in where(changed)[2]
 
 
 def test_bars_are_few_and_are_the_gaps_without_and_with_what_was_found(delayed):

@@ -54,9 +54,12 @@ def a_dent(folder: Path) -> None:
 
 
 def a_part(folder: Path) -> None:
+    """As parts come: in mm, turned, and far from the file's origin."""
     import trimesh
 
-    trimesh.creation.box((60, 60, 30)).apply_translation((0, 0, 15)).export(folder / "part.stl")
+    part = trimesh.creation.box((60, 60, 30)).apply_translation((0, 0, 15))
+    turned = trimesh.transformations.rotation_matrix(np.radians(30), (0, 0, 1))
+    part.apply_transform(turned).apply_translation((120, -80, 35)).export(folder / "part.stl")
 
 
 RUN: dict[str, Callable[[Path], None]] = {

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from palpate.mechanics.errors import ContactError, LoudAirError
+from palpate.mechanics.errors import ContactError, FewPressesError, LoudAirError
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import ON_SUPPORT, TimeSegment, runs
 from palpate.reconstruction.steps.s1_filter.signals import Filtered, Signals, stated_tracing
@@ -251,9 +251,10 @@ def _too_few(
             "they lie below the support, so forces have the wrong sign; state the other force_on in the "
             "recording's TOML"
         )
-    return ContactError(
+    return FewPressesError(
         f"{counts[0]} usable palpations among {counts[1]} contacts of phase II{why}; at least "
-        f"{request.least_presses} {'is' if request.least_presses == 1 else 'are'} needed: {hint}"
+        f"{request.least_presses} {'is' if request.least_presses == 1 else 'are'} needed: {hint}",
+        0 if below else counts[0],
     )
 
 

@@ -62,18 +62,18 @@ class Chart {
       pen.beginPath();
       curves.depths.forEach((m, i) => pen.lineTo(x(m), y(curves.high[i])));
       for (let i = curves.depths.length - 1; i >= 0; i--) pen.lineTo(x(curves.depths[i]), y(curves.low[i]));
-      pen.fillStyle = colours.rendered;
+      pen.fillStyle = colours.fem;
       pen.globalAlpha = 0.2;
       pen.fill();
       pen.globalAlpha = 1;
-      line(curves.depths, curves.force, colours.rendered, 2);
-      if (curves.oneD) line(curves.depths, curves.oneD, colours.oneD, 1.8, [6, 4]);
+      line(curves.depths, curves.force, colours.fem, 2);
+      if (curves.oneD) line(curves.depths, curves.oneD, colours["hunt-crossley"], 1.8, [6, 4]);
     }
     pen.restore();
     if (now) {
       pen.beginPath();
       pen.arc(x(now[0]), y(now[1]), 5.5, 0, 2 * Math.PI);
-      pen.fillStyle = colours.rendered;
+      pen.fillStyle = colours.fem;
       pen.strokeStyle = colours.paper;
       pen.lineWidth = 2;
       pen.fill();

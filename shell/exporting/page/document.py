@@ -25,6 +25,7 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.press import Stroke, press
 from palpate.render.scene import TouchScene, in_the_air
+from palpate.show.colours import style_sheet
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
 from palpate.words import kpa, mm
 
@@ -64,7 +65,7 @@ def page_of(
     filled = {
         "name": html.escape(title or model.name),
         "summary": _summary(model),
-        "style": file("page.css"),
+        "style": style_sheet() + file("page.css"),
         "picture": _picture(model),
         "one_d": '<li><i class="one-d"></i>interpolated 1D model</li>' if about["one_d"] else "",
         "table_title": table_title,

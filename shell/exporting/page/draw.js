@@ -212,7 +212,7 @@ class Drawing {
     });
     gl.bindVertexArray(this.whole);
     gl.drawElements(gl.TRIANGLES, this.surface.triangles.length, gl.UNSIGNED_INT, 0);
-    part(this.parts.beads, WHERE_IT_IS, [...linear(colours.dot), 1]);
+    part(this.parts.beads, WHERE_IT_IS, [...linear(colours.touch), 1]);
     const chosen = this.dots[scene.chosen];
     if (chosen) part(this.parts.ball, standing(chosen, up, 0.0018, 0.0018), [...linear(colours.chosen), 1]);
     if (scene.radius > 0) {
@@ -224,7 +224,7 @@ class Drawing {
       const pull = size(scene.force);
       if (!scene.hover && pull > 1e-3) {
         const way = times(scene.force, 1 / pull), long = pull * scene.newton_m, head = Math.min(0.4 * long, radius * 1.3);
-        const paint = [...linear(colours.arrow), 1], side = plus(tip, plus(view.right, up, 0), radius * 1.35);
+        const paint = [...linear(colours.fem), 1], side = plus(tip, plus(view.right, up, 0), radius * 1.35);
         part(this.parts.rod, standing(side, way, radius * 0.34, Math.max(long - head, 1e-5)), paint);
         part(this.parts.cone, standing(plus(side, way, Math.max(long - head, 0)), way, head * 0.42, head), paint);
       }

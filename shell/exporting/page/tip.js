@@ -32,7 +32,7 @@ class SeenTip {
 
   colours() {
     const style = getComputedStyle(document.documentElement);
-    const names = ["object", "dot", "chosen", "tip", "arrow", "shadow", "low", "middle", "high", "soft", "line", "paper", "measured", "rendered", "oneD"];
+    const names = ["object", "touch", "chosen", "tip", "shadow", "low", "middle", "high", "soft", "line", "paper", "measured", "fem", "hunt-crossley"];
     return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
   }
 

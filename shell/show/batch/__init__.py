@@ -10,7 +10,8 @@ from palpate.batching.plan import Batch
 from palpate.batching.steps import MODEL
 from palpate.mechanics.model.files import read_model
 from palpate.show.batch.page import draw_agreement, story
-from palpate.show.scenery import OBJECT_COLOUR, surface_of
+from palpate.show.colours import COLOURS
+from palpate.show.scenery import surface_of
 from palpate.show.story import Key
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def draw(result: Batch, ax: Axes) -> None:
         np.array([getattr(row, f"young_modulus_{end}pa") or np.nan for row in known], dtype=float) / 1e3
         for end in ("", "lo_", "hi_")
     )
-    ax.errorbar(e, np.arange(len(known)), xerr=[e - low, high - e], fmt="o", ms=4, color="#1d3557")
+    ax.errorbar(e, np.arange(len(known)), xerr=[e - low, high - e], fmt="o", ms=4, color=COLOURS["modulus"])
     ax.set_yticks(range(len(known)), [row.recording for row in known], fontsize=9)
     ax.invert_yaxis()
     ax.set_xlabel("Young's modulus with its 95 % interval [kPa]")
@@ -55,5 +56,5 @@ def place(result: Batch, plotter: Plotter) -> None:
         used = points[np.unique(triangles)]
         low, high = used.min(axis=0), used.max(axis=0)
         moved = np.array(points) - [low[0] - start, (low[1] + high[1]) / 2, low[2]]
-        plotter.add_mesh(pyvista.PolyData.from_regular_faces(moved, triangles), color=OBJECT_COLOUR)
+        plotter.add_mesh(pyvista.PolyData.from_regular_faces(moved, triangles), color=COLOURS["object"])
         start += 1.2 * (high[0] - low[0])

@@ -15,6 +15,7 @@ from palpate.batching.plan import THUMBNAIL
 from palpate.batching.summary import Batch, BatchEntry
 from palpate.diagnosis.compare.models import RIVALS
 from palpate.show import story as say
+from palpate.show.colours import COLOURS
 from palpate.show.diagnosis.words import short_verdict
 from palpate.show.page import new_figure
 from palpate.words import counted, kpa, mn
@@ -49,8 +50,8 @@ def story(result: Batch) -> say.Story:
     yield say.Detail(meaning(result), on=say.PAGE)
     yield say.Next(next_steps(result))
     if result.agreements:
-        yield say.Section("Repeatability: one object, explored more than once", _agreement(result))
-    yield say.Section("Recordings", _page(result))
+        yield say.Section("Do explorations of one object agree?", _agreement(result))
+    yield say.Section("What came of each recording?", _page(result), unfolded=True)
 
 
 def _lines(result: Batch) -> say.Story:
@@ -96,7 +97,7 @@ def _page(result: Batch) -> say.Story:
         yield say.Sentence("Errors of FEM and of the best 1D model: rms force at held-out touches.")
     yield say.Markup('<p>The table as a file: <a href="summary.csv">summary.csv</a>.</p>')
     if cost := _cost(result):
-        yield say.Section("What it cost", [say.Markup(cost)])
+        yield say.Section("What did it cost?", [say.Markup(cost)])
     yield say.Markup(f"<script>\n{_file('batch.js')}</script>")
 
 
@@ -304,11 +305,11 @@ def draw_agreement(ax: Axes, result: Batch) -> Axes:
         )
         at = k + (np.linspace(-0.3, 0.3, len(rows)) if len(rows) > 1 else np.zeros(1))
         ax.errorbar(e, at, xerr=[np.maximum(e - low, 0), np.maximum(high - e, 0)], fmt="o", ms=3.5,
-                    lw=1, color="#1d3557", ecolor="#8fa3bd")  # fmt: skip
+                    lw=1, color=COLOURS["modulus"], ecolor=COLOURS["path"])  # fmt: skip
         ax.fill_betweenx(
-            [k - 0.42, k + 0.42], 1 - found.spread, 1 + found.spread, color="#2a9d8f", alpha=0.15
+            [k - 0.42, k + 0.42], 1 - found.spread, 1 + found.spread, color=COLOURS["interval"], zorder=0
         )
-    ax.axvline(1, color="#8a96a5", lw=0.8)
+    ax.axvline(1, color=COLOURS["reference"], lw=0.8)
     labels = [f"{a.object}\n{kpa(a.young_modulus_pa, '.1f')}" for a in shown]
     ax.set_yticks(range(len(shown)), labels, fontsize=9)
     ax.invert_yaxis()

@@ -59,9 +59,9 @@ def story(result: Comparison) -> say.Story:
         ),
         result.model,
     )
-    yield say.Section("", _how(result))
-    yield say.Section("What was left out of the fits", _evidence(result))
-    yield say.Section("What each model is made for", [
+    yield say.Section("How large are the errors?", _how(result))
+    yield say.Section("Where are they, and what was left out of the fits?", _evidence(result))
+    yield say.Section("What is each model made for?", [
         say.Sentence(
             "The 1D models need no mesh and no base, and cost nothing to compute; inside a dense cloud of "
             "touches they follow the object. At untouched places they repeat the nearest touches, "
@@ -111,8 +111,8 @@ def _evidence(result: Comparison) -> say.Story:
     for region in (r.region for r in result.regions if r.region.name in ("top-centre", "base-band")):
         yield say.Picture(
             partial(across_region, result, region.members),
-            f"Force at {mm(DEPTH_M, 'g')} by place with {region.name} left out of every fit; red: the "
-            "left-out presses as measured.",
+            f"Force at {mm(DEPTH_M, 'g')} by place with {region.name} left out of every fit; filled "
+            "squares: the left-out presses as measured.",
         )
 
 
@@ -197,6 +197,8 @@ def meaning(result: Comparison) -> str:
         f"At a held-out place the FEM is {fem:.0f} mN off, {called(best)} {other:.0f} mN, of "
         f"which the sensor's noise is {noise:.0f} mN."
     )
+    wins = result.wins("fem")
+    words += f" Of {len(result.presses)} presses, each left out of the fits, the FEM predicts {wins} best."
     if result.rmse_n["fem"] < 1.3 * result.noise_n:
         words += " The FEM's share of its error is smaller than the sensor can resolve."
     return words

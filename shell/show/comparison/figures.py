@@ -10,6 +10,7 @@ from palpate.diagnosis.compare.comparison import Comparison
 from palpate.diagnosis.compare.models import HOMOGENEOUS, RIVALS, stiffness_along
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.show.bars import draw_errors, height_of
+from palpate.show.colours import COLOURS, colour_of
 from palpate.show.model import facing, local, usual_colourings, view_of_presses
 from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR
@@ -21,10 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = {"fem": "#1d3557", "kelvin-voigt": "#e08e1b", "hunt-crossley": "#2a9d8f"}
-COLOURS |= {HOMOGENEOUS: "#8d99ae", "measured": "#c1121f"}
-OTHER = "#7b2d8b"
-"""Of a simulator that is set beside them."""
 _MARKS = ("o", "^", "s", "x", "d")
 DEPTH_M = 0.004
 
@@ -40,10 +37,8 @@ def view(result: Comparison) -> View:
     presses, names = result.presses, compared(result)
     lines = [Line("measured", local(presses, presses.force), "measured")]
     for name in names:
-        kind = "rendered" if name == "fem" else "effect"
-        lines.append(
-            Line(called(name), local(presses, result.predicted[name]), kind, name in ("fem", *RIVALS))
-        )
+        shown = name in ("fem", *RIVALS)
+        lines.append(Line(called(name), local(presses, result.predicted[name]), name, shown))
     words = "Root mean square of predicted less measured force over each press, held out of every fit."
     colourings = [
         Colouring(ERROR, None, result.press_rmse_n[name], words, name=f"error of {called(name)}")
@@ -82,7 +77,7 @@ def still(result: Comparison) -> Figure:
         right.plot(
             depth,
             result.predicted[name][rows] @ normal,
-            color=COLOURS.get(name, OTHER),
+            color=colour_of(name),
             lw=1.2,
             label=called(name),
         )
@@ -98,7 +93,7 @@ def _worst(result: Comparison) -> int:
 
 def error_bars(result: Comparison) -> Figure:
     """Error of each model over all held-out presses."""
-    bars = [(called(name), result.rmse_n[name], COLOURS.get(name, OTHER)) for name in compared(result)]
+    bars = [(called(name), result.rmse_n[name], colour_of(name)) for name in compared(result)]
     figure = new_figure(5.5, height_of(len(bars)), layout="constrained")
     draw_errors(figure.subplots(), bars, result.noise_n, "typical error of a held-out press [mN]")
     return figure
@@ -116,10 +111,10 @@ def draw(result: Comparison, ax: Axes) -> None:
             1e3 * result.press_rmse_n[name][order],
             _MARKS[k],
             ms=4.5,
-            color=COLOURS.get(name, OTHER),
+            color=colour_of(name),
             label=called(name),
         )
-    ax.axhline(1e3 * result.noise_n, color="0.5", ls="--", lw=1, label="sensor's noise")
+    ax.axhline(1e3 * result.noise_n, color=COLOURS["noise"], ls="--", lw=1, label="sensor's noise")
     step = -(-len(order) // 20)
     ax.set_xticks(place[::step], [str(i + 1) for i in order[::step]], fontsize=8)
     ax.set(xlabel="number of the held-out press", ylabel="typical error [mN]", yscale="log")
@@ -140,8 +135,8 @@ def scatter(result: Comparison) -> Figure:
     top = float(measured.max())
     for ax, name in zip(axes, compared(result), strict=True):
         predicted = (result.predicted[name] * normal).sum(axis=1)
-        ax.plot(measured[::10], predicted[::10], ".", ms=1.5, color=COLOURS.get(name, OTHER), rasterized=True)
-        ax.plot([0, top], [0, top], color="0.3", lw=0.8)
+        ax.plot(measured[::10], predicted[::10], ".", ms=1.5, color=colour_of(name), rasterized=True)
+        ax.plot([0, top], [0, top], color=COLOURS["reference"], lw=0.8)
         ax.set(title=called(name), xlabel="measured [N]", aspect="equal")
     axes[0].set_ylabel("predicted [N]")
     return figure
@@ -167,7 +162,7 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
     ax = figure.subplots()
     x = coordinate[family][order] * 1e3
     for name in (n for n in compared(result) if n in forces):  # a simulator was run along the path alone
-        ax.plot(x, forces[name][order], "o", ms=4, color=COLOURS.get(name, OTHER), label=called(name))
+        ax.plot(x, forces[name][order], "o", ms=4, color=colour_of(name), label=called(name))
     measured = _at_depth(result)
     for inside, face, label in ((False, "none", "measured, fitted"), (True, None, "measured, left out")):
         chosen = family & (members == inside) & np.isfinite(measured)

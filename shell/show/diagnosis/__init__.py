@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.show.colours import COLOURS
 from palpate.show.diagnosis.figures import draw, view
 from palpate.show.diagnosis.gaps import diagnosed, gap_at, sites_of
 from palpate.show.diagnosis.story import story
@@ -24,7 +25,7 @@ def place(result: Diagnosis, plotter: Plotter) -> None:
     model = diagnosed(result)[1]
     gap = gap_at(result, surface_of(model)[0]) * 1e3
     add_object(plotter, model, gap, label="gap [mN]", colour_map=ERROR.colour_map)
-    add_dots(plotter, sites_of(result), colour="#2a9d8f")
+    add_dots(plotter, sites_of(result), colour=COLOURS["touch"])
     touch = result.next_touch
     if touch is not None and result.candidates:
         along = np.array(touch.direction)

@@ -13,6 +13,7 @@ from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.model.model import Model
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.show.bars import draw_errors, height_of
+from palpate.show.colours import COLOURS, colour_of
 from palpate.show.diagnosis.gaps import (
     beside,
     diagnosed,
@@ -34,15 +35,14 @@ from palpate.show.story import Picture
 from palpate.show.view3d import Colouring, Line, View
 from palpate.words import spoken
 
-MEASURED, IDEAL, IMPROVED, RIVAL = "#1d3557", "#e76f51", "#2a9d8f", "#e9b44c"
 
-
-def first_picture(model: Model, result: Diagnosis) -> Any:
-    """Where on the object, and how it looks in the press that differs most."""
+def first_picture(model: Model, result: Diagnosis, simulated: str = "simplest") -> Any:
+    """Where on the object, and how it looks in the press that differs most. simulated: whose force is
+    diagnosed, by its name in the table of colours."""
     figure = new_figure(10, 3.9, layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=[1.1, 1.05])
     _object(left, model, result)
-    _press(right, result, worst_press(result))
+    _press(right, result, worst_press(result), simulated)
     right.set_title("a press there", fontsize=11)
     right.legend(fontsize=8.5, frameon=False)
     return figure
@@ -55,8 +55,9 @@ def gains_picture(result: Diagnosis) -> Any:
     return figure
 
 
-def view(result: Diagnosis) -> View:
-    """The object by its gap; each press as measured, simulated, with what was found and with each effect."""
+def view(result: Diagnosis, simulated: str = "simplest") -> View:
+    """The object by its gap; each press as measured, simulated, with what was found and with each effect.
+    simulated: as of `first_picture`."""
     model = diagnosed(result)[1]
     t, before, after = gap_of(result)
     each = press_gaps(result)
@@ -64,7 +65,7 @@ def view(result: Diagnosis) -> View:
     def line(name: str, residual: np.ndarray, kind: str, shown: bool = True) -> Line:
         return Line(name, t.local_force - residual, kind, shown)
 
-    lines = [line("measured", np.zeros_like(before), "measured"), line("simulated", before, "rendered")]
+    lines = [line("measured", np.zeros_like(before), "measured"), line("simulated", before, simulated)]
     if result.effects:
         lines.append(line("with what was found", after, "found"))
     lines += [
@@ -93,7 +94,7 @@ def _object(ax: Any, model: Model, result: Diagnosis) -> None:
     draw_object(ax, model, Colours(values, ERROR), touches=places, azimuth_deg=azimuth)
     seen = view_axes(model.support.normal, 25.0, azimuth)
     x, y, _ = (worst - model.mesh.points.mean(axis=0)) @ seen.T * 1e3
-    ax.scatter([x], [y], s=190, facecolors="none", edgecolors=IMPROVED, linewidths=2.2, zorder=4)
+    ax.scatter([x], [y], s=190, facecolors="none", edgecolors=COLOURS["touch"], linewidths=2.2, zorder=4)
     ax.set_title("on the object (dots: places touched, ring: largest)", fontsize=11)
 
 
@@ -109,7 +110,7 @@ def modulus_picture(better: Model, result: Diagnosis) -> Any:
     return figure
 
 
-def _press(ax: Any, result: Diagnosis, press: int) -> None:
+def _press(ax: Any, result: Diagnosis, press: int, simulated: str) -> None:
     t, before, after = gap_of(result)
     rows = (t.press == press) & t.counted
     clock = t.t[rows] - t.onset_s[press]
@@ -118,11 +119,11 @@ def _press(ax: Any, result: Diagnosis, press: int) -> None:
     if sideways(result):
         pull = (measured * np.linalg.norm(measured[:, 1:], axis=1)[:, None]).sum(axis=0) * [0.0, 1.0, 1.0]
         along = pull / max(float(np.linalg.norm(pull)), 1e-12)
-    ax.plot(clock, measured @ along, color=MEASURED, lw=1.8, label="measured")
-    ax.plot(clock, (measured - before[rows]) @ along, color=IDEAL, lw=1.2, label="simulated")
+    ax.plot(clock, measured @ along, color=COLOURS["measured"], lw=1.8, label="measured")
+    ax.plot(clock, (measured - before[rows]) @ along, color=colour_of(simulated), lw=1.2, label="simulated")
     if result.effects:
         ax.plot(
-            clock, (measured - after[rows]) @ along, color=IMPROVED, lw=1.2, ls="--",
+            clock, (measured - after[rows]) @ along, color=COLOURS["found"], lw=1.2, ls="--",
             label="simulated with what was found",
         )  # fmt: skip
     ax.set(
@@ -135,18 +136,18 @@ def _press(ax: Any, result: Diagnosis, press: int) -> None:
 def _bars(result: Diagnosis) -> list[tuple[str, float, str]]:
     """(what is simulated, gap N, colour): as it is, with what was found, with each that is not ruled out;
     where nothing was found, with the best that was tried."""
-    bars = [("the simplest simulation", result.gap_before_n, IDEAL)]
+    bars = [("the simplest simulation", result.gap_before_n, COLOURS["simplest"])]
     if result.effects:
-        bars.append((f"with {spoken(result.effects)}", result.gap_after_n, IMPROVED))
+        bars.append((f"with {spoken(result.effects)}", result.gap_after_n, COLOURS["found"]))
     rest = [e for e in shown_entries(result) if e.name not in result.effects]
     if not result.effects and not result.candidates:
         rest = sorted(rest, key=lambda e: e.gap_after_n)[:1]
-    return bars + [(f"with {beside(result, e.name)}", e.gap_after_n, RIVAL) for e in rest]
+    return bars + [(f"with {beside(result, e.name)}", e.gap_after_n, COLOURS["not-ruled-out"]) for e in rest]
 
 
 def draw(result: Diagnosis, ax: Any) -> None:
-    """How far the simulation is off at places not fitted (mN rms): as it is, with what was found (green),
-    with what is not ruled out (yellow); the line is the sensor's noise."""
+    """How far the simulation is off at places not fitted (mN rms): as it is, with what was found,
+    with what is not ruled out; the line is the sensor's noise."""
     draw_errors(ax, _bars(result), result.noise_n, "typical difference from the measured force [mN]")
 
 
@@ -165,22 +166,22 @@ def _curve(result: Diagnosis, name: str, along: str) -> Any:
     figure = new_figure(5.2, 2.9, layout="constrained")
     ax = figure.subplots()
     x, mean, error = result.where.curves[name]
-    ax.errorbar(x, mean * 1e3, error * 1e3, marker="o", ms=4, color=MEASURED)
-    ax.axhline(0, color="#999999", lw=0.8)
+    ax.errorbar(x, mean * 1e3, error * 1e3, marker="o", ms=4, color=COLOURS["change"])
+    ax.axhline(0, color=COLOURS["reference"], lw=0.8)
     ax.set(xlabel=along, ylabel="measured less simulated [mN]")
     ax.spines[["top", "right"]].set_visible(False)
     return figure
 
 
-def press_pictures(result: Diagnosis, count: int = 3) -> list[Picture]:
+def press_pictures(result: Diagnosis, simulated: str = "simplest", count: int = 3) -> list[Picture]:
     """Force against time of the presses with the largest gap, after the first, a picture each."""
     shown = [int(press) for press in ranked(result) if press != worst_press(result)][:count]
-    return [Picture(partial(_one_press, result, press), f"Press {press + 1}.") for press in shown]
+    return [Picture(partial(_one_press, result, press, simulated), f"Press {press + 1}.") for press in shown]
 
 
-def _one_press(result: Diagnosis, press: int) -> Any:
+def _one_press(result: Diagnosis, press: int, simulated: str) -> Any:
     figure = new_figure(5.2, 2.9, layout="constrained")
     ax = figure.subplots()
-    _press(ax, result, press)
+    _press(ax, result, press, simulated)
     ax.legend(fontsize=8.5, frameon=False)
     return figure

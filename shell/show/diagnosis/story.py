@@ -81,13 +81,14 @@ def story(result: Diagnosis) -> say.Story:
     yield say.Next(next_steps(result))
     yield say.Section("", _shown(result))
     if result.next_touch is not None:
-        heading = "To be sure: touch here next" if result.unsettled else "If you touch it once more"
+        heading = "Where to touch next, to be sure?" if result.unsettled else "And if you touch it once more?"
         hangs = "" if result.unsettled else " It is optional: the answer above does not depend on it."
-        yield say.Section(heading, [say.Sentence(f"{ended(touch_words(result))}{hangs}")])
-    yield say.Section("How large", _how_large(result))
-    yield say.Section("Everything that was tried", _tried(result))
-    yield say.Section("What the difference depends on", _follows(result))
-    yield say.Section("What the comparison itself may get wrong", _own_errors(result))
+        once_more = [say.Sentence(f"{ended(touch_words(result))}{hangs}")]
+        yield say.Section(heading, once_more, unfolded=result.unsettled)
+    yield say.Section("How large is it?", _how_large(result))
+    yield say.Section("What was tried?", _tried(result))
+    yield say.Section("What does the difference depend on?", _follows(result))
+    yield say.Section("What may the comparison itself get wrong?", _own_errors(result))
 
 
 def _how_far(result: Diagnosis) -> say.Story:
@@ -114,13 +115,12 @@ def _means(result: Diagnosis) -> say.Story:
 
 
 def _shown(result: Diagnosis) -> say.Story:
-    """The answers side by side, the object, and what is gained."""
+    """The answers side by side, and the object."""
     model = diagnosed(result)[1]
     yield say.Cards(answers(result))
     yield say.Turned(
         lambda: view(result), say.Picture(lambda: first_picture(model, result), _caption(result)), model
     )
-    yield say.Picture(lambda: gains_picture(result), _gains_caption(result))
 
 
 def next_steps(result: Diagnosis) -> Iterator[str]:
@@ -177,6 +177,7 @@ def _modulus_words(model: Model, result: Diagnosis) -> str:
 
 def _how_large(result: Diagnosis) -> say.Story:
     model = diagnosed(result)[1]
+    yield say.Picture(lambda: gains_picture(result), _gains_caption(result))
     rows = parameter_rows(result)
     if rows:
         yield say.Rows(["effect", "quantity", "found", "95 % sure between", "unit"], rows)

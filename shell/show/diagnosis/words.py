@@ -10,7 +10,7 @@ import numpy as np
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.effects.base import Scope
 from palpate.mechanics.effects.registry import effect
-from palpate.show.diagnosis.gaps import depth_contrast, in_model
+from palpate.show.diagnosis.gaps import depth_contrast, in_model, press_gaps, worst_press
 from palpate.show.diagnosis.parameters import short
 from palpate.words import begun, between_words, force_words, listed, mm, percent, place_mm, spaced, spoken
 
@@ -146,6 +146,8 @@ def where(result: Diagnosis) -> tuple[str, str, str]:
     """Where it differs, told so that it fits what was named: a component of the force is no cause."""
     axis = result.where.leading
     *there_m, rms = result.where.worst[0]
+    if result.forward is not None:  # of the press that is shown, as the view says it
+        rms = float(press_gaps(result)[worst_press(result)])
     largest = place_mm(there_m)
     question = "Where does it show?"
     if result.kind == "none":

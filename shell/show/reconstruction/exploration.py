@@ -13,8 +13,8 @@ from palpate.reconstruction.pipeline import Reconstruction
 from palpate.reconstruction.steps.s6_one_d import profiles
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import nearest_nodes
 from palpate.render.surface.felt_surface import felt_surface
+from palpate.show.colours import COLOURS
 from palpate.show.page import subplots
-from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR, TOUCH_COLOUR
 from palpate.show.scenery import draw_object, view_axes
 
 if TYPE_CHECKING:
@@ -29,12 +29,12 @@ def force_over_time(ax: Axes, exploration: Measured) -> Axes:
     starts, peaks = (
         np.searchsorted(t, at) for at in (exploration.presses.onset_s, exploration.presses.peak_s)
     )
-    ax.plot(t, force, lw=0.7, color=FORCE_COLOUR)
-    ax.plot(t[starts], force[starts], "o", ms=4, mfc="none", color=TOUCH_COLOUR, label="first touch")
-    ax.plot(t[peaks], force[peaks], "+", ms=7, color=PEAK_COLOUR, label="peak")
+    ax.plot(t, force, lw=0.7, color=COLOURS["measured"])
+    ax.plot(t[starts], force[starts], "o", ms=4, mfc="none", color=COLOURS["touch"], label="first touch")
+    ax.plot(t[peaks], force[peaks], "+", ms=7, color=COLOURS["peak"], label="peak")
     first, last = exploration.boundary.interval
     if last > first:
-        ax.axvspan(t[first], t[last - 1], color=PHASE_COLOUR, zorder=0, label="phase I")
+        ax.axvspan(t[first], t[last - 1], color=COLOURS["base-tracing"], zorder=0, label="phase I")
     ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(t[0], t[-1]))
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=3)
     return ax
@@ -50,9 +50,11 @@ def touched_points(ax: Axes, exploration: Measured) -> Axes:
         return (points - boundary.support_point) @ view.T * 1e3
 
     rim, sample, touches = seen(boundary.outline), seen(boundary.points), seen(exploration.presses.point)
-    ax.plot(rim[:, 0], rim[:, 1], lw=1, color=FORCE_COLOUR, label="base outline")
-    ax.plot(sample[:, 0], sample[:, 1], "o", ms=4, mfc="none", color=TOUCH_COLOUR, label="sample of the base")
-    ax.plot(touches[:, 0], touches[:, 1], "+", ms=8, color=PEAK_COLOUR, label="first touches")
+    ax.plot(rim[:, 0], rim[:, 1], lw=1, color=COLOURS["base"], label="base outline")
+    ax.plot(
+        sample[:, 0], sample[:, 1], "o", ms=4, mfc="none", color=COLOURS["base"], label="sample of the base"
+    )
+    ax.plot(touches[:, 0], touches[:, 1], "+", ms=8, color=COLOURS["touch"], label="first touches")
     ax.set_aspect("equal")
     ax.set_axis_off()
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.04), frameon=False, ncols=3, fontsize=8)
@@ -73,7 +75,7 @@ def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
     first = np.unique(node, return_index=True)[1]
     for i in first[facing[first]]:
         x, y = seen[i, :2]
-        ax.plot(x, y, "o", ms=9, mfc="white", mec=PEAK_COLOUR, mew=1)
+        ax.plot(x, y, "o", ms=9, mfc="white", mec=COLOURS["touch"], mew=1)
         ax.text(x, y, str(i + 1), ha="center", va="center", fontsize=5.5)
     return ax
 
@@ -91,7 +93,7 @@ def _mesh_edges(ax: Axes, model: Model, view: np.ndarray, pieces: int = 5) -> No
     near = own[cKDTree(surface.points[own]).query(ends[:, 0] * (1 - share) + ends[:, 1] * share)[1]]
     facing = (surface.normals[near] @ view[2] > 0.02).all(axis=1)
     seen = (surface.points[near[facing]] - model.mesh.points.mean(axis=0)) @ view[:2].T * 1e3
-    ax.add_collection(LineCollection(seen, colors="#b9a88f", linewidths=0.4))
+    ax.add_collection(LineCollection(seen, colors=COLOURS["mesh"], linewidths=0.4))
 
 
 def force_profiles(ax: Axes, result: Reconstruction) -> Axes:
@@ -134,12 +136,12 @@ def damped_parameters(axes: np.ndarray, result: Reconstruction) -> np.ndarray:
 def spread(ax: Axes, samples: list[np.ndarray], names: list[str], stars: list[float] | None = None) -> Axes:
     """A box and every value of each sample; stars: one marked value a sample."""
     samples = [s[np.isfinite(s)] for s in samples]
-    ax.boxplot(samples, widths=0.5, showfliers=False, medianprops={"color": PEAK_COLOUR})
+    ax.boxplot(samples, widths=0.5, showfliers=False, medianprops={"color": COLOURS["whole"]})
     for i, sample in enumerate(samples):
         aside = np.linspace(-0.14, 0.14, len(sample))
-        ax.plot(i + 1 + aside, sample, ".", ms=4, color=FORCE_COLOUR, alpha=0.7)
+        ax.plot(i + 1 + aside, sample, ".", ms=4, color=COLOURS["press"], alpha=0.7)
     for i, star in enumerate(stars or []):
-        ax.plot(i + 1, star, "*", ms=13, color=TOUCH_COLOUR)
+        ax.plot(i + 1, star, "*", ms=13, color=COLOURS["whole"])
     ax.set_xticks(range(1, len(samples) + 1), names)
     return ax
 

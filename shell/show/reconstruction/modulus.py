@@ -13,10 +13,10 @@ from palpate.mechanics.model.model import Model
 from palpate.reconstruction.pipeline import Reconstruction
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.render.surface.felt_surface import felt_surface
+from palpate.show.colours import COLOURS
 from palpate.show.page import subplots
 from palpate.show.quantities import KELVIN_VOIGT, MODULUS, ShownQuantity
 from palpate.show.reconstruction.exploration import spread
-from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR
 from palpate.show.scenery import Colours, draw_object
 
 if TYPE_CHECKING:
@@ -126,8 +126,8 @@ def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None
     for ax, key, label in zip(axes[1], ("k_v", "k_h", "e_pa"), ("$k_V$", "$k_H$", "e"), strict=True):
         value = model.presses.fits[key]
         share = 100 * (value[side] / np.nanmean(value[side]) - 1) if side.any() else np.zeros(0)
-        ax.plot(height[side], share, "o", ms=4, color=FORCE_COLOUR)
-        ax.axhline(0, color=PEAK_COLOUR, lw=1)
+        ax.plot(height[side], share, "o", ms=4, color=COLOURS["press"])
+        ax.axhline(0, color=COLOURS["whole"], lw=1)
         ax.set(xlabel="height above the support [mm]", ylabel=f"{label} over its mean [%]")
         reach = max([reach, *np.abs(share[np.isfinite(share)])])
         if key in trends:
@@ -169,7 +169,9 @@ def moduli_figure(models: dict[str, Model]) -> Figure:
     for i, model in enumerate(models.values()):
         low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
         if np.isfinite([low, high]).all():
-            axes[0].plot([i + 1.34] * 2, [low, high], "-", lw=3, color=PEAK_COLOUR, solid_capstyle="butt")
+            axes[0].plot(
+                [i + 1.34] * 2, [low, high], "-", lw=3, color=COLOURS["whole"], solid_capstyle="butt"
+            )
         axes[0].annotate(
             f"{stars[i]:.2f}", (i + 1.34, stars[i]), xytext=(6, 0), textcoords="offset points", va="center"
         )
@@ -190,12 +192,12 @@ def depth_figure(fit: ModulusFit) -> Figure:
     depth = np.array([row[0] for row in fit.by_depth]) * 1e3
     value = np.array([row[1] for row in fit.by_depth]) / 1e3
     agrees = np.array([row[2] for row in fit.by_depth])
-    ax.axhspan(*(np.array(fit.ci95_pa) / 1e3), color="#f1e3cf", label="95 % sure")
-    ax.plot(depth, value, "-", lw=1, color=FORCE_COLOUR)
-    ax.plot(depth[agrees], value[agrees], "o", color=FORCE_COLOUR, label="agrees with shallower samples")
+    ax.axhspan(*(np.array(fit.ci95_pa) / 1e3), color=COLOURS["interval"], label="95 % sure")
+    ax.plot(depth, value, "-", lw=1, color=COLOURS["press"])
+    ax.plot(depth[agrees], value[agrees], "o", color=COLOURS["press"], label="agrees with shallower samples")
     if (~agrees).any():
-        ax.plot(depth[~agrees], value[~agrees], "o", mfc="white", color=FORCE_COLOUR, label="does not")
-    ax.plot(fit.press.depth_m * 1e3, fit.modulus_pa / 1e3, "*", ms=13, color=PEAK_COLOUR, label="chosen")
+        ax.plot(depth[~agrees], value[~agrees], "o", mfc="white", color=COLOURS["press"], label="does not")
+    ax.plot(fit.press.depth_m * 1e3, fit.modulus_pa / 1e3, "*", ms=13, color=COLOURS["whole"], label="chosen")
     low, high = min(value.min(), fit.ci95_pa[0] / 1e3), max(value.max(), fit.ci95_pa[1] / 1e3)
     margin = 0.3 * (high - low)
     ax.set(xlabel="samples up to depth [mm]", ylabel="modulus [kPa]", ylim=(low - margin, high + 2 * margin))
@@ -205,14 +207,14 @@ def depth_figure(fit: ModulusFit) -> Figure:
 
 def quality_histogram(ax: Axes, values: np.ndarray, label: str, bound: float, word: str = "bound") -> Axes:
     """Histogram of a mesh quality, its bound drawn where it lies among the values, else named."""
-    ax.hist(values, bins=40, color=FORCE_COLOUR)
+    ax.hist(values, bins=40, color=COLOURS["press"])
     most = float(values.max())
     ax.set(xlabel=label, ylabel="count")
     if bound > 1.3 * most:
         ax.set_xlim(min(0.0, float(values.min())), 1.05 * most)
         ax.plot([], [], " ", label=f"all lie below the {word}, {bound:g}")
     else:
-        ax.axvline(bound, color=PEAK_COLOUR, lw=1.5, label=f"{word} {bound:g}")
+        ax.axvline(bound, color=COLOURS["whole"], lw=1.5, label=f"{word} {bound:g}")
     ax.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return ax
 

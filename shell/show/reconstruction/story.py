@@ -84,14 +84,20 @@ def story(result: Reconstruction, beside: dict[str, Model] | None = None) -> say
         ),
         model,
     )
-    yield say.Section("", _how(result))
+    yield say.Section("How was it made, and how sure is it?", _how(result))
+    yield say.Section("How does it look in the paper's figures?", _paper(result, beside), evidence=True)
+
+
+def _paper(result: Reconstruction, beside: dict[str, Model] | None) -> say.Story:
+    """The figures and tables of the paper, remade."""
+    model, exploration = result.model, result.exploration
     models, name = {exploration.recording.name: model, **(beside or {})}, exploration.recording.name
-    yield say.Section("Exploration and geometry", _explored(result), evidence=True)
-    yield say.Section("1D models", _one_d(result, models), evidence=True)
+    yield say.Section("Exploration and geometry", _explored(result))
+    yield say.Section("1D models", _one_d(result, models))
     other = next(iter((beside or {}).items()), None)
-    yield say.Section("Where the parameters hold", _places(result, name, other), evidence=True)
-    yield say.Section("Modulus", _modulus(result, models, beside or {}), evidence=True)
-    yield say.Section("Where this differs from the paper, and why", _differs(result), evidence=True)
+    yield say.Section("Where the parameters hold", _places(result, name, other))
+    yield say.Section("Modulus", _modulus(result, models, beside or {}))
+    yield say.Section("Where this differs from the paper, and why", _differs(result))
 
 
 def _meant(result: Reconstruction) -> say.Story:
@@ -137,7 +143,7 @@ def _made(result: Reconstruction) -> say.Story:
 
 def _explored(result: Reconstruction) -> say.Story:
     yield say.Sentence(
-        "From here on: the figures and tables of the paper whose method this is, remade from this recording "
+        "The figures and tables of the paper whose method this is, remade from this recording "
         "(Goksel, Jeon, Harders and Székely, Deformable Haptic Model Generation Through Manual Exploration)."
     )
     yield say.Picture(

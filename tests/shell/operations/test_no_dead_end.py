@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 import palpate as pp
 import palpate.show
 from palpate.cli import main
-from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.errors import ContactError, OptionError, RecordingError
 from palpate.mechanics.recording.recording import write_recording
 from palpate.operations._list import OPERATIONS
 from palpate.operations._run import parser_of
@@ -118,6 +119,71 @@ def test_a_grave_finding_is_gone_by_a_way_that_it_names(fault, tmp_path, monkeyp
     words = shlex.split(re.search(r"palpate open [^'\n]*", said)[0])
     with pytest.raises(Reached):
         main([*words[1:], "--report", "none"])
+
+
+def words_with(recording, way, folder) -> list[str]:
+    """The command of a way for a recording, as one would type it."""
+    file = write_recording(folder / "wrong.csv", recording)
+    return shlex.split(open_words({"files": (str(file),)}, way.options))[1:]
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [pytest.param(f, marks=[pytest.mark.release] * (f not in ("gaps", "rate said a tenth"))) for f in FAULTS],
+)
+def test_every_command_that_a_refused_file_is_told_gets_further(fault, tmp_path, monkeypatch, capsys):
+    """To the reconstruction; a file that is to be named stays aside."""
+
+    class Reached(Exception):
+        pass
+
+    def reconstruct(*_, **__):
+        raise Reached
+
+    monkeypatch.setattr("palpate.operations.reconstruct.reconstruct", reconstruct)
+    wrong = FAULTS[fault].change(explore_cylinder()[0], np.random.default_rng(0))
+    file = str(write_recording(tmp_path / "wrong.csv", wrong))
+    try:
+        code = main(["open", file, "--report", "none"])
+    except Reached:
+        return
+    assert code in (1, 2)
+    said = capsys.readouterr()
+    told = re.findall(r"palpate (open [^'\n`]*)", said.out + said.err)
+    if not told:
+        assert code == 2 and re.search(r" must be |mend the clock", said.err), "no other meaning mends it"
+    for command in (each for each in told if "SHAPE.stl" not in each):
+        try:
+            code = main([*shlex.split(command), "--report", "none"])
+        except Reached:
+            continue
+        # ten times too large is no unit: read as the nearest one, it is checked, and says what is wrong
+        assert fault == "position x 10" and code == 1 and "GRAVE" in capsys.readouterr().out
+
+
+def two_presses():
+    """Of an exploration that was broken off."""
+    whole, onsets = explore_cylinder()
+    few = whole.t < onsets[2] - 0.2
+    return replace(
+        whole, t=whole.t[few], position=whole.position[few], force_on_tool=whole.force_on_tool[few]
+    )
+
+
+def test_few_presses_are_told_what_they_suffice_for():
+    """It said to press more, and nothing of what the presses that are there can tell."""
+    (finding,) = (f for f in looked_at(two_presses())[0] if f.grave)
+    assert finding.name == "no presses" and [w.options["least_palpations"] for w in finding.ways] == [2, 2]
+    with pytest.raises(ContactError, match="--least-palpations 2"):
+        pp.reconstruct(two_presses(), half_space=True, progress=False)
+
+
+@pytest.mark.slow
+def test_what_few_presses_are_told_gives_a_modulus(tmp_path, capsys):
+    (finding,) = (f for f in looked_at(two_presses())[0] if f.grave)
+    for way in finding.ways:
+        assert main([*words_with(two_presses(), way, tmp_path), "--report", "none"]) in (0, 1)
+        assert "modulus" in capsys.readouterr().out
 
 
 def test_every_way_of_every_fault_is_a_command_that_open_takes(tmp_path):

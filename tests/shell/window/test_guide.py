@@ -50,6 +50,7 @@ class FakeExplorer:
         return Suggestion("press", "here least is known", point, normal, 0.004)
 
     state = SimpleNamespace(surface="", made=0, trouble="")
+    estimate = SimpleNamespace(exploration=None)
 
     def bring_up_to_date(self):
         pass
@@ -106,7 +107,7 @@ def test_a_press_that_was_asked_for_on_the_bare_support_is_none_of_the_object(gu
     explorer.suggest = lambda: Suggestion("rigid", "a yielding tool and a soft object both stand")
     a_press = (0.2, 0.0), (0.5, 2.0), (0.4, 0.0)
     _frames(guide, servo, *a_press * 2)
-    assert guide.lines()[0].startswith("press the bare support: a yielding tool")
+    assert guide.lines()[0] == "press the bare support"
     servo.height_m = 0.005
     _frames(guide, servo, *a_press)
     # what was done counts: the second was on the object all the same
@@ -141,4 +142,4 @@ def test_the_ghost_stands_a_tips_radius_above_the_place(guided):
     _frames(guide, servo, (0.2, 0.0), (0.5, 0.7), (0.4, 0.0))
     np.testing.assert_allclose(guide.ghost.centre, [0, 0, 0.035])
     np.testing.assert_allclose(guide.ghost.into, [0, 0, -1])
-    assert guide.ghost.depth_m == 0.004 and "press at the ghost, 4 mm deep" in guide.lines()[0]
+    assert guide.ghost.depth_m == 0.004 and "press at the green ghost, 4 mm deep" in guide.lines()[0]

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 
+import numpy as np
 import pytest
+import pyvista
 
 from palpate.mechanics.errors import SceneError
+from palpate.operations.touch import DEFAULT
 from palpate.scenes.scene import load_scene
-from palpate.window.waiting import ClosedError, WaitingWindow
-from palpate.window.widgets import HINT, PAPER
+from palpate.show.colours import HINT, PAPER
+from palpate.window.waiting import ClosedError, WaitingWindow, _draw
 
 from ...support.waiting import PATIENCE_S
 
@@ -92,3 +96,14 @@ def test_a_closed_gallery_chooses_nothing() -> None:
     with pytest.raises(ClosedError, match="before a scene was chosen"):
         window.choose()
     window.close()
+
+
+def test_the_first_card_is_a_picture_of_what_one_will_touch(own_cache: Path) -> None:
+    """It was a cloud of where the tip went."""
+    plotter = pyvista.Plotter(off_screen=True)
+    _draw(plotter, load_scene(DEFAULT))
+    (actor,) = plotter.actors.values()
+    drawn = actor.mapper.dataset
+    size = np.ptp(drawn.points, axis=0)
+    assert drawn.n_cells > 100 and size == pytest.approx([0.08, 0.08, 0.08], rel=0.1)
+    plotter.close()

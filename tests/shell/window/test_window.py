@@ -20,8 +20,10 @@ from palpate.mechanics.recording.recording import read_recording
 from palpate.operations.touch import ServoRun
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene, load_scene
+from palpate.show.colours import COLOURS
 from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
+from palpate.window.keys import KEYS
 from palpate.window.panel import DEPTH
 from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.widgets import BODY
@@ -94,8 +96,8 @@ def test_the_picture_shows_tip_arrow_and_plot(driven: Driven) -> None:
     def like(colour: tuple[int, int, int]) -> int:
         return int((np.abs(driven.picture().astype(int) - colour).sum(axis=2) < 90).sum())
 
-    arrow = (27, 79, 156)
-    before, hovering = like(arrow), like((217, 95, 2))
+    arrow, tip = (pyvista.Color(COLOURS[thing]).int_rgb for thing in ("fem", "tip"))
+    before, hovering = like(arrow), like(tip)
     press(driven)
     driven.until(lambda f: like(arrow) > before + 30)  # an arrow appears
     assert hovering > 50, "the tip is drawn"
@@ -353,11 +355,13 @@ def test_only_what_does_something_is_offered(driven: Driven) -> None:
 
 def test_a_guided_person_is_asked_for_one_thing_at_a_time(driven: Driven, monkeypatch) -> None:
     window = driven.window
-    guide = SimpleNamespace(suggestion=SimpleNamespace(kind="press"), lines=lambda: ["press at the ghost"])
+    guide = SimpleNamespace(
+        suggestion=SimpleNamespace(kind="press"), lines=lambda: ["press at the ghost", "nothing"]
+    )
     monkeypatch.setattr(window, "game", Game([NODULE], UP))
     driven.says("A nodule is hidden")
     monkeypatch.setattr(window, "guide", guide)
-    driven.says("press at the ghost")
+    driven.says("Press at the ghost.")
     driven.says("A nodule is hidden", says=False)
     guide.suggestion.kind = "stop"
     driven.says("A nodule is hidden")
@@ -479,7 +483,7 @@ def test_two_pictures_by_one_button(driven: Driven) -> None:
     assert window.sides == 2
     both = press(driven)
     assert both.views[1].name == "hunt-crossley"
-    driven.says("N  hunt-crossley")
+    driven.says("N  stiffening spring")
     release(driven)
 
 
@@ -493,10 +497,10 @@ def test_settings_change_what_is_felt(driven: Driven) -> None:
     assert session.young_modulus_pa == pytest.approx(25e3)
     driven.click("25.0 kPa")
     assert session.young_modulus_pa == pytest.approx(20e3)
-    driven.click("hunt-crossley")
+    driven.click("stiffening spring")
     assert session.renderer_name == "hunt-crossley"
     driven.says("Friction", says=False)
-    driven.click("fem")
+    driven.click("this model")
     assert session.renderer_name == "fem"
     driven.says("finite strain")
     driven.click("off")
@@ -540,7 +544,10 @@ def test_help_and_screenshot(driven: Driven, tmp_path: Path, monkeypatch: pytest
     driven.says("Press less deep")
     driven.key("h")
     driven.says("Press less deep", says=False)
+    driven.click("More")
     driven.click("Save picture")
+    driven.click("More")
+    driven.says("Save picture", says=False)
     assert len(list(tmp_path.glob("touch-*.png"))) == 1
 
 
@@ -550,3 +557,28 @@ def test_the_servo_never_waits_for_the_window(driven: Driven) -> None:
     assert eventually(lambda: driven.session.report().ticks > before + 500)
     assert driven.window.frames == drawn
     assert driven.session.servo.alive
+
+
+def test_buttons_stand_in_three_groups_and_the_rare_ones_are_folded_away(driven: Driven) -> None:
+    column = driven.window.boards[0]
+    driven.frame()
+    words = column.text.split("\n")
+    groups = [word for word in words if word in ("Touch", "Look", "Session")]
+    assert groups == ["Touch", "Look", "Session"]
+    buttons = {item.text for item, _ in column.placed if item.do}
+    rare = {key.button for key in KEYS.values() if key.rare}
+    assert rare and not rare & buttons
+    driven.click("More")
+    driven.says("Save picture")
+    assert rare <= {item.text for item, _ in column.placed if item.do}
+    driven.click("More")
+
+
+def test_a_renderer_has_a_name_for_people_and_says_the_technical_one(driven: Driven) -> None:
+    driven.click("Settings")
+    driven.says("Close")
+    column, aside = driven.window.boards
+    tips = {item.text: item.tip for item, _ in aside.placed if item.do}
+    assert tips["this model"] == "fem" and tips["spring and damper"] == "kelvin-voigt"
+    assert "fem" not in column.text and any("friction coefficient" in item.tip for item, _ in column.placed)
+    driven.click("Close")
