@@ -58,8 +58,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             ("law's bound", "surface's error"), used, factors, low, high, strict=True
         )
     ]
-    for figure in figures:
-        print(f"{figure.what}: {figure.value:.2f} ({figure.spread[0]:.2f} to {figure.spread[1]:.2f})")
+    for figure, a, b in zip(figures, low, high, strict=True):
+        print(f"{figure.what}: {figure.value:.2f} ({a:.2f} to {b:.2f})")
     return {"objects": len(each), "places": sum(map(len, each)), "figures": figures}
 
 

@@ -156,8 +156,9 @@ def search_of(corrected: Corrected, nuisance: NuisanceOptions, rules: Attributio
         finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
     )  # fmt: skip
     misfit = misfit_of(forward, found.judge([found.finite_strain]).found, site_sd)
-    seeking = [e for e in corrected.tried if e.hints.seek is not None]
-    found.starts = {e.name: e.hints.seek(forward, misfit) for e in seeking}
+    found.starts = {
+        e.name: e.hints.seek(forward, misfit) for e in corrected.tried if e.hints.seek is not None
+    }
     return found
 
 

@@ -271,7 +271,8 @@ def _by_site(
     site_of_row = t.site[t.press]
     for site in range(t.sites):
         rows = np.flatnonzero((site_of_row == site) & t.counted)
-        matrix, own_law = [], []
+        matrix: list[np.ndarray] = []
+        own_law: list[int] = []
         for level, column in columns:
             part = column[rows]
             if level != "press":

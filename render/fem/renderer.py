@@ -115,6 +115,13 @@ class FemRenderer(Renderer):
             self.far_at(slice(None))
         return self
 
+    @property
+    def whole_compliance(self) -> SurfaceCompliance:
+        """The table of the whole surface; condensed first where it is not yet."""
+        whole = self.condensed().compliance
+        assert isinstance(whole, SurfaceCompliance)
+        return whole
+
     def with_modulus(self, young_modulus_pa: float) -> FemRenderer:
         if not young_modulus_pa > 0:
             raise OptionError(f"young_modulus_pa is {young_modulus_pa}; it must be greater than 0")
@@ -144,7 +151,7 @@ class FemRenderer(Renderer):
         if blocks is not None:
             table = np.array(blocks, dtype=np.float32, order="C")
             changed.parameters = changed.parameters._replace(blocks=table)
-            changed.compliance = replace(self.compliance, blocks=table.copy())
+            changed.compliance = replace(self.whole_compliance, blocks=table.copy())
         return changed
 
     def _smooth_displacement(self, points: np.ndarray, forces_on_tool: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ class MovingInclusion:
 
     def __init__(self, model: Model, renderer: FemRenderer, progress: Progress = silent) -> None:
         progress("factorising the object", 0.0)
-        compliance = renderer.compliance
+        compliance = renderer.whole_compliance
         self._mesh = model.mesh.quadratic()
         material = model.material
         hold = base_hold(model.effects, model.support.normal, material.young_modulus_pa)

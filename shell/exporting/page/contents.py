@@ -147,7 +147,7 @@ def spacemouse_reports() -> list[dict[str, Any]]:
 def _far(block: PackedArrays, renderer: FemRenderer) -> None:
     """Modes by which a force moves the mesh's corners, U U^T / E, and how each vertex hangs on three of
     them."""
-    compliance, contact = renderer.compliance, renderer.contact
+    compliance, contact = renderer.whole_compliance, renderer.contact
     number = np.full(len(renderer.model.mesh.points), len(compliance.nodes))
     number[compliance.nodes] = np.arange(len(compliance.nodes))
     modes = shown_modes(compliance)
