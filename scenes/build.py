@@ -30,7 +30,7 @@ from palpate.mechanics.plausible import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.recording.files import recording_files
 from palpate.mechanics.recording.recording import read_recording
-from palpate.mechanics.shape.flat_foot import Standing, standing
+from palpate.mechanics.shape.flat_foot import Standing, direction, standing
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.scenes.embedded import embedded_names, embedded_recording
 from palpate.scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
@@ -174,7 +174,7 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
 
     Raises SurfaceError where it is open or has no flat foot.
     """
-    surface = surface_of(shape, scene.unit)
+    surface = surface_of(shape, scene.unit, direction(scene.up))
     return _built(
         scene,
         standing(surface, scene.up, scene.sink_m),
