@@ -20,7 +20,6 @@ import numpy as np
 from palpate.mechanics.disk.mesh_parts import words_of
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.disk.scratch import cache_folder
-from palpate.mechanics.disk.surface_files import surface_of
 from palpate.mechanics.disk.writing import atomic_folder
 from palpate.mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
 from palpate.mechanics.model.files import MODEL, read_model, write_model
@@ -180,7 +179,9 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
 
     Raises SurfaceError where it is open or has no flat foot.
     """
-    surface = surface_of(shape, scene.unit, direction(scene.up))
+    from palpate.reconstruction.geometry.filled import solid_of
+
+    surface = solid_of(shape, scene.unit, direction(scene.up))
     return _built(
         scene,
         standing(surface, scene.up, scene.sink_m),

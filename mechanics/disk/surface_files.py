@@ -21,7 +21,7 @@ from palpate.mechanics.disk.holes import close
 from palpate.mechanics.disk.mesh_parts import Part, bodies, labels
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
-from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.errors import NotClosed, SurfaceError
 from palpate.mechanics.quantities import parse_unit
 
 if TYPE_CHECKING:
@@ -114,13 +114,18 @@ def _closed(
         raise SurfaceError(f"'{name}' holds no triangles: export the object as a surface of triangles")
     size = float(np.ptp(shell.vertices, axis=0).max())
     _check_size(name, size, unit)
-    notes = close(shell, name, UNITS[unit], up)
+    given = np.array(shell.vertices) * UNITS[unit], np.array(shell.faces, dtype=np.int64)
+    try:
+        notes = close(shell, name, UNITS[unit], up)
+    except SurfaceError as error:
+        raise NotClosed(str(error), *given) from error
     if shell.volume < 0:
         shell.invert()
     if not shell.volume > 1e-6 * size**3:
-        raise SurfaceError(
+        raise NotClosed(
             f"'{name}' encloses no volume: it is a sheet, or it crosses itself, so that inside and outside "
-            "cancel; a solid object is needed: mend it in the program that made the file"
+            "cancel; a solid object is needed: mend it in the program that made the file",
+            *given,
         )
     vertices = np.asarray(shell.vertices) * UNITS[unit]
     parts = labelled or bodies(shell, path, UNITS[unit])

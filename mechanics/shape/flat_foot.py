@@ -84,7 +84,7 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
     if _is_point(vertices, triangles, foot, normal):
         warnings.warn(
             f"'{surface.name}' stands on a point, the bottom of a round underside, and a real one settles: "
-            f"--sink {0.05 * np.ptp(vertices @ normal):.1g} cuts so many metres off flat",
+            f"--sink {sink_m + 0.05 * np.ptp(vertices @ normal):.1g} cuts so many metres off flat",
             PointFoot,
             stacklevel=2,
         )

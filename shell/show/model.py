@@ -181,7 +181,7 @@ def mended_words(model: Model) -> str:
     """What was done to a mesh that was not closed; '' where it was."""
     mended = model.provenance.get("mended", "")
     volume = f"{1e6 * model.mesh.volumes.sum():.4g} cm³"
-    return f"the file's surface was open: {mended}; the model encloses {volume}" if mended else ""
+    return f"the file's surface was mended: {mended}; the model encloses {volume}" if mended else ""
 
 
 def modulus_words(model: Model) -> str:
