@@ -24,8 +24,8 @@ from palpate.mechanics.errors import MeshError
 MOST_TETRAHEDRA = 150_000
 """Beyond it the factorised stiffness of quadratic elements takes more memory than a desktop has."""
 AFFORDABLE = 20_000
-"""Up to it a model's quadratic elements take some 2 GB to press (1.5 GB at 28,000 nodes of 12,000 of them: a
-mesh of a bent shape has up to half more)."""
+"""So many tetrahedra by volume a model has at most: an organ at 12,000 (28,000 nodes) takes 1.5 GB. The finer
+surface that presses are solved on comes on top, and may take far more."""
 _REGULAR = 2**0.5 / 12
 _ENERGY, _PASSES = 10.0, 80
 """The optimisation stops at this AMIPS energy (3 is ideal), or after so many passes."""
@@ -168,7 +168,7 @@ def tetrahedra(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> fl
 
 
 def affordable(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> float:
-    """The edge length, m, nearest to one that was asked for which a model takes some 2 GB at most."""
+    """The edge length, m, nearest to one that was asked of at most AFFORDABLE tetrahedra."""
     return edge_m * max(1.0, tetrahedra(vertices, triangles, edge_m) / AFFORDABLE) ** (1 / 3)
 
 
