@@ -6,7 +6,10 @@ Every message says what came, what is allowed and what to do, in one line.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 class PalpateError(Exception):
@@ -52,6 +55,15 @@ class NoBaseError(ContactError):
 
 class SurfaceError(PalpateError):
     """No closed, oriented surface could be made of the touched points."""
+
+
+class NotClosed(SurfaceError):
+    """A file's triangles enclose no solid as they are. vertices: (n, 3) m; triangles: (m, 3), as wound in the
+    file."""
+
+    def __init__(self, message: str, vertices: np.ndarray, triangles: np.ndarray) -> None:
+        super().__init__(message)
+        self.vertices, self.triangles = vertices, triangles
 
 
 class MeshError(PalpateError):

@@ -20,7 +20,6 @@ import numpy as np
 from palpate.mechanics.disk.mesh_parts import words_of
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.disk.scratch import cache_folder
-from palpate.mechanics.disk.surface_files import surface_of
 from palpate.mechanics.disk.writing import atomic_folder
 from palpate.mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
 from palpate.mechanics.model.files import FELT, MODEL, read_model, write_model
@@ -30,7 +29,7 @@ from palpate.mechanics.plausible import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.recording.files import recording_files
 from palpate.mechanics.recording.recording import read_recording
-from palpate.mechanics.shape.flat_foot import Standing, standing
+from palpate.mechanics.shape.flat_foot import Standing, direction, standing
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.scenes.embedded import embedded_names, embedded_recording
 from palpate.scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
@@ -41,6 +40,12 @@ from palpate.scenes.virtual_presses import palpate_model
 VERSION = 7
 MESH_SIZE_M, LEAST_EDGES = 0.010, 8
 """Edge length of the tetrahedra, and the least number of edges along an object."""
+_SIZES = 3
+"""How many edge lengths are tried, each 1.3 times the one before, where the mesher takes too long."""
+
+
+class CoarserMesh(PalpateWarning):
+    """Tetrahedra are larger than what was asked for."""
 
 
 def model_of(
@@ -186,7 +191,9 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
 
     Raises SurfaceError where it is open or has no flat foot.
     """
-    surface = surface_of(shape, scene.unit)
+    from palpate.reconstruction.geometry.filled import solid_of
+
+    surface = solid_of(shape, scene.unit, direction(scene.up))
     return _built(
         scene,
         standing(surface, scene.up, scene.sink_m),
@@ -209,6 +216,7 @@ def _built(
     from palpate.reconstruction.shapes.drawing import decimated
     from palpate.reconstruction.steps.s4_surface import Surface
     from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
+    from palpate.reconstruction.steps.s5_mesh.tetwild import MeshTooDear, affordable
 
     surface = Surface(
         vertices=stood.vertices,
@@ -221,8 +229,24 @@ def _built(
         redraw=lambda edge_m: decimated(stood, edge_m),
         shape=TrueShape(stood.vertices, stood.triangles),
     )
-    edge = scene.mesh_size_m or min(MESH_SIZE_M, float(np.ptp(stood.vertices, axis=0).max()) / LEAST_EDGES)
-    meshing = mesh_surface(surface, MeshingOptions(mesh_size_m=edge), lambda s, f: progress(s, 0.4 * f))
+    asked = scene.mesh_size_m or min(MESH_SIZE_M, float(np.ptp(stood.vertices, axis=0).max()) / LEAST_EDGES)
+    edge = affordable(stood.vertices, stood.triangles, asked)
+    for rest in reversed(range(_SIZES)):
+        try:
+            sized = MeshingOptions(mesh_size_m=edge)
+            meshing = mesh_surface(surface, sized, lambda s, f: progress(s, 0.4 * f))
+            break
+        except MeshTooDear:
+            if not rest:
+                raise
+            edge *= 1.3
+    if edge > asked:
+        warnings.warn(
+            f"tetrahedra of {1e3 * asked:.3g} mm take too much memory or time for this object: "
+            f"{1e3 * edge:.3g} mm are taken, --mesh-size {edge:.2g}",
+            CoarserMesh,
+            stacklevel=3,
+        )
     material = replace(
         own,
         young_modulus_pa=scene.young_modulus_pa or own.young_modulus_pa,

@@ -29,8 +29,8 @@ SITES = 32
 DEPTH_M = 0.005
 SPEED_M_PER_S = 0.02
 RATE_HZ = 500.0
-CLEARANCE_M = 0.008
-"""Least height of a place over the support: a tip must get there."""
+CLEARANCE_M, CLEARANCE_SHARE = 0.008, 0.5
+"""Least height of a place over the support, where a tip must get; of a lower object so much of its height."""
 LEAST_FLATNESS = 0.9
 """Cosine between a place's normal and those of its triangles: rims are not pressed."""
 
@@ -93,6 +93,7 @@ def spread_places(model: Model, count: int, *, clearance_m: float = CLEARANCE_M)
     """
     mesh = model.mesh
     height = model.support.height(mesh.points)
+    clearance_m = min(clearance_m, CLEARANCE_SHARE * float(height.max()))
     triangles = mesh.touchable_surface[:, :3]
     corners = np.unique(triangles)
     flatness = np.ones(len(mesh.points))
@@ -104,7 +105,10 @@ def spread_places(model: Model, count: int, *, clearance_m: float = CLEARANCE_M)
         mesh.touchable[corners] & (height[corners] > clearance_m) & (flatness[corners] > LEAST_FLATNESS)
     ]
     if not len(able):
-        raise SceneError("the object has no smooth place above the support to press: use a finer mesh_size_m")
+        raise SceneError(
+            "the object has no smooth place above the support to press, each node lies on a rim: use "
+            f"--mesh-size {model.mesh_size_m / 2:.2g}"
+        )
     chosen = [int(able[np.argmax(height[able])])]
     distance = np.linalg.norm(mesh.points[able] - mesh.points[chosen[0]], axis=1)
     while len(chosen) < min(count, len(able)):

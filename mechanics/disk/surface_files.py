@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.mechanics.disk.gmsh1 import is_gmsh1, read_gmsh1
+from palpate.mechanics.disk.holes import close
 from palpate.mechanics.disk.mesh_parts import Part, bodies, labels
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
-from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.errors import NotClosed, SurfaceError
 from palpate.mechanics.quantities import parse_unit
 
 if TYPE_CHECKING:
@@ -35,9 +36,6 @@ UNITS = {unit: parse_unit(unit).scale for unit in ("m", "cm", "mm", "um", "in")}
 """Metres in a file's unit of length."""
 LEAST_M, GREATEST_M = 0.002, 2.0
 """An object that a hand explores is so large across."""
-_SMALL, _FLAT = 0.1, 0.01
-"""Of the object's size: how wide a hole may be that is closed, how far off its plane the rim of a wider
-one."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +60,9 @@ def is_surface_file(path: Path | str) -> bool:
     return Path(path).suffix.lower() in SUFFIXES
 
 
-def read_surface(path: Path | str, unit: str = "m") -> ClosedSurface:
-    """The closed surface in a file. unit: of its lengths, one of UNITS.
+def read_surface(path: Path | str, unit: str = "m", up: np.ndarray | None = None) -> ClosedSurface:
+    """The closed surface in a file. unit: of its lengths, one of UNITS. up: (3,) unit, out of the support; a
+    surface that is open where it stands is closed there (`holes.close`).
 
     Raises SurfaceError where the file is not there, holds no triangles, is open, or is of no size that a hand
     explores.
@@ -78,19 +77,19 @@ def read_surface(path: Path | str, unit: str = "m") -> ClosedSurface:
         raise SurfaceError(f"'{path}' {no_file(path)}: name a file that is there")
     shell, labelled = _shell_of(path, UNITS[unit])
     with _silent():
-        return _closed(shell, path.name, unit, labelled, path)
+        return _closed(shell, path.name, unit, up, labelled, path)
 
 
-def surface_of(shape: Any, unit: str = "m") -> ClosedSurface:
+def surface_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> ClosedSurface:
     """The closed surface of a file, or of a triangle mesh that has `vertices` (n, 3) in `unit` and `faces`
-    (m, 3).
+    (m, 3). up: as in `read_surface`.
 
     Raises SurfaceError as `read_surface` does, and for what is neither.
     """
     import trimesh
 
     if isinstance(shape, str | Path):
-        return read_surface(shape, unit)
+        return read_surface(shape, unit, up)
     if not (hasattr(shape, "vertices") and hasattr(shape, "faces")):
         raise SurfaceError(
             f"a {type(shape).__name__} is no surface: give a file, or a mesh with vertices and faces"
@@ -99,24 +98,34 @@ def surface_of(shape: Any, unit: str = "m") -> ClosedSurface:
         raise SurfaceError(f"unit is '{unit}'; allowed are {', '.join(UNITS)}")
     mesh = trimesh.Trimesh(np.array(shape.vertices, dtype=float), np.array(shape.faces), process=False)
     with _silent():
-        return _closed(mesh, "the mesh", unit)
+        return _closed(mesh, "the mesh", unit, up)
 
 
 def _closed(
-    shell: trimesh.Trimesh, name: str, unit: str, labelled: tuple[Part, ...] = (), path: Path | None = None
+    shell: trimesh.Trimesh,
+    name: str,
+    unit: str,
+    up: np.ndarray | None = None,
+    labelled: tuple[Part, ...] = (),
+    path: Path | None = None,
 ) -> ClosedSurface:
     shell = _cleaned(shell)
     if not len(shell.faces):
         raise SurfaceError(f"'{name}' holds no triangles: export the object as a surface of triangles")
     size = float(np.ptp(shell.vertices, axis=0).max())
     _check_size(name, size, unit)
-    notes = _close(shell, name, UNITS[unit])
+    given = np.array(shell.vertices) * UNITS[unit], np.array(shell.faces, dtype=np.int64)
+    try:
+        notes = close(shell, name, UNITS[unit], up)
+    except SurfaceError as error:
+        raise NotClosed(str(error), *given) from error
     if shell.volume < 0:
         shell.invert()
     if not shell.volume > 1e-6 * size**3:
-        raise SurfaceError(
+        raise NotClosed(
             f"'{name}' encloses no volume: it is a sheet, or it crosses itself, so that inside and outside "
-            "cancel; a solid object is needed: mend it in the program that made the file"
+            "cancel; a solid object is needed: mend it in the program that made the file",
+            *given,
         )
     vertices = np.asarray(shell.vertices) * UNITS[unit]
     parts = labelled or bodies(shell, path, UNITS[unit])
@@ -239,113 +248,3 @@ def _check_size(name: str, size: float, unit: str) -> None:
     raise SurfaceError(
         f"'{name}' is {size:.4g} {unit} across; {LEAST_M:g} to {GREATEST_M:g} m are allowed: {hint}"
     )
-
-
-def _close(shell: trimesh.Trimesh, name: str, metres: float) -> tuple[str, ...]:
-    """Close small and flat holes of the shell in place; what was done. Raises SurfaceError for other
-    holes."""
-    if shell.is_watertight:
-        _wind(shell)
-        return ()
-    size = float(np.ptp(shell.vertices, axis=0).max())
-    rims = _rims(shell)
-    for rim in rims:
-        points = shell.vertices[rim]
-        width, middle = float(np.ptp(points, axis=0).max()), points.mean(axis=0)
-        off = np.linalg.svd(points - middle)[2][2] @ (points - middle).T
-        if width > _SMALL * size and np.abs(off).max() > _FLAT * size:
-            place = ", ".join(f"{1e3 * metres * x:.4g}" for x in middle)
-            raise SurfaceError(
-                f"'{name}' is open: a hole {1e3 * metres * width:.4g} mm wide at ({place}) mm, neither small "
-                "nor flat; close it in the program that made the file"
-            )
-    new = [face for rim in rims for face in _lid(shell.vertices, rim)]
-    shell.faces = np.vstack([shell.faces, np.array(new).reshape(-1, 3)])
-    _wind(shell)
-    if not shell.is_watertight:
-        edges, counts = np.unique(shell.edges_sorted, axis=0, return_counts=True)
-        bad = shell.vertices[edges[counts != 2]].reshape(-1, 3).mean(axis=0)
-        place = ", ".join(f"{1e3 * metres * x:.4g}" for x in bad)
-        raise SurfaceError(
-            f"'{name}' is not closed near ({place}) mm: every edge must belong to two triangles; mend it in "
-            "the program that made the file"
-        )
-    return (f"{len(rims)} hole{'s' * (len(rims) > 1)} closed",)
-
-
-def _wind(shell: trimesh.Trimesh) -> None:
-    """Turn triangles in place so that neighbours agree, outward."""
-    import pyvista
-
-    if shell.is_winding_consistent:
-        return
-    drawn = pyvista.PolyData.from_regular_faces(np.asarray(shell.vertices), np.asarray(shell.faces))
-    drawn = drawn.compute_normals(
-        cell_normals=True, point_normals=False, consistent_normals=True, auto_orient_normals=True
-    )
-    shell.faces = drawn.regular_faces
-
-
-def _rims(shell: trimesh.Trimesh) -> list[np.ndarray]:
-    """Closed chains of the nodes along edges of one triangle alone."""
-    directed = shell.edges
-    _, inverse, counts = np.unique(shell.edges_sorted, axis=0, return_inverse=True, return_counts=True)
-    following: dict[int, list[int]] = {}
-    for a, b in directed[counts[inverse.ravel()] == 1]:
-        following.setdefault(int(a), []).append(int(b))
-        following.setdefault(int(b), []).append(int(a))
-    rims = []
-    while following:
-        start = next(iter(following))
-        chain = [start]
-        while following.get(chain[-1]):
-            nxt = following[chain[-1]].pop()
-            following[nxt].remove(chain[-1])
-            if nxt == start:
-                break
-            chain.append(nxt)
-        for node in [n for n, others in following.items() if not others]:
-            del following[node]
-        if len(chain) > 2:
-            rims.append(np.array(chain))
-    return rims
-
-
-def _lid(vertices: np.ndarray, rim: np.ndarray) -> list[tuple[int, int, int]]:
-    """Triangles over a rim, by cutting ears in its own plane."""
-    points = vertices[rim] - vertices[rim].mean(axis=0)
-    flat = points @ np.linalg.svd(points, full_matrices=False)[2][:2].T
-    after = np.roll(flat, -1, axis=0)
-    if (flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum() < 0:
-        rim, flat = rim[::-1], flat[::-1]
-    left = list(range(len(rim)))
-    made = []
-    while len(left) > 3:
-        at = _ear(flat, left)
-        a, b, c = left[at - 1], left[at], left[(at + 1) % len(left)]
-        made.append((int(rim[a]), int(rim[b]), int(rim[c])))
-        del left[at]
-    return [*made, (int(rim[left[0]]), int(rim[left[1]]), int(rim[left[2]]))]
-
-
-def _ear(flat: np.ndarray, left: list[int]) -> int:
-    """Which of the nodes that are left can be cut off: the corner of the widest angle that holds no other."""
-    best, widest = 0, -np.inf
-    points = flat[left]
-    for at in range(len(left)):
-        a, b, c = points[at - 1], points[at], points[(at + 1) % len(left)]
-        one, two = b - a, c - b
-        turn = one[0] * two[1] - one[1] * two[0]
-        if turn <= 0:
-            continue
-        others = np.delete(points, [at - 1 if at else len(left) - 1, at, (at + 1) % len(left)], axis=0)
-        sides = [
-            (q - p)[0] * (others[:, 1] - p[1]) - (q - p)[1] * (others[:, 0] - p[0])
-            for p, q in ((a, b), (b, c), (c, a))
-        ]
-        if (np.minimum.reduce(sides) >= 0).any():
-            continue
-        sharp = -float(np.linalg.norm(c - a))
-        if sharp > widest:
-            best, widest = at, sharp
-    return best

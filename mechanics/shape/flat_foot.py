@@ -6,6 +6,9 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
 
 from palpate.mechanics.disk.surface_files import ClosedSurface
 from palpate.mechanics.errors import PalpateWarning, SurfaceError
@@ -19,10 +22,21 @@ surface."""
 _POINT, _GENTLE = 0.15, 0.8
 """A foot is a point that covers less than this share of what stands over it, where the surface beside it goes
 on as gently as this (cosine)."""
+_SINKS = (0.02, 0.03, 0.05, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3)
+"""Of the height: what is tried where a value of --sink is proposed."""
+_HANGING = 0.02
+"""Of the volume: what may hang in the air."""
+_TILT, _FLAT, _A_FOOT, _ON_IT = 15.0, 0.002, 0.04, 0.5
+"""A foot that is tilted in the file: its greatest angle, degrees; how far its triangles lie off its plane, of
+the size; its least share of the surface; the share of it on the stated plane from which that is right."""
 
 
 class PointFoot(PalpateWarning):
     """An object stands on the lowest point of a round underside."""
+
+
+class TiltedFoot(PalpateWarning):
+    """The flat foot of an object does not lie on the stated plane."""
 
 
 @dataclass(frozen=True)
@@ -42,28 +56,35 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
 
     Raises SurfaceError where there is no flat foot.
     """
-    normal = _direction(up)
+    normal = direction(up)
     vertices, triangles = surface.vertices, surface.triangles
     if not 0 <= sink_m < np.ptp(vertices @ normal):
         raise SurfaceError(f"--sink is {sink_m} m; it must lie between 0 and the object's height")
+    if not sink_m:
+        normal = _righted(surface, up, normal)
     if sink_m:
         vertices, triangles = _cut(vertices, triangles, normal, sink_m)
     foot = _foot(vertices, triangles, normal)
+    hanging = _hanging(vertices, triangles, foot)
     if _share(vertices, triangles, foot) < _LEAST_FOOT:
         others = [
             u for u in UPS
-            if _share(vertices, triangles, _foot(vertices, triangles, _direction(u))) >= _LEAST_FOOT
+            if _share(vertices, triangles, _foot(vertices, triangles, direction(u))) >= _LEAST_FOOT
         ]  # fmt: skip
         hint = f"its flat ones are for --up {', '.join(others)}; or " if others else ""
         raise SurfaceError(
-            f"'{surface.name}' has no flat foot to stand on with {up} up: {hint}cut off what settles, "
-            f"--sink {0.02 * np.ptp(vertices @ normal):.1g}"
+            f"'{surface.name}' has no flat foot to stand on with {up} up: {hint}{_way(surface, normal)}"
+        )
+    if hanging > _HANGING:
+        raise SurfaceError(
+            f"'{surface.name}' is of several bodies, and {100 * hanging:.0f} % of their volume touches "
+            f"neither the support nor what stands on it with {up} up: {_way(surface, normal)}"
         )
     nodes = np.unique(triangles[foot])
     if _is_point(vertices, triangles, foot, normal):
         warnings.warn(
             f"'{surface.name}' stands on a point, the bottom of a round underside, and a real one settles: "
-            f"--sink {0.05 * np.ptp(vertices @ normal):.1g} cuts so many metres off flat",
+            f"--sink {sink_m + 0.05 * np.ptp(vertices @ normal):.1g} cuts so many metres off flat",
             PointFoot,
             stacklevel=2,
         )
@@ -75,8 +96,8 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
     return Standing(vertices, triangles, middle, normal)
 
 
-def _direction(up: str) -> np.ndarray:
-    """(3,) unit."""
+def direction(up: str) -> np.ndarray:
+    """(3,) unit, out of the support. up: one of UPS or "X,Y,Z"; raises SurfaceError for another."""
     if up in UPS:
         return (1.0 if up[0] == "+" else -1.0) * np.eye(3)["xyz".index(up[1])]
     try:
@@ -86,6 +107,115 @@ def _direction(up: str) -> np.ndarray:
     if given.shape != (3,) or not np.isfinite(given).all() or not given.any():
         raise SurfaceError(f"--up is '{up}'; allowed are {', '.join(UPS)} or three numbers X,Y,Z")
     return given / np.linalg.norm(given)
+
+
+def _way(surface: ClosedSurface, normal: np.ndarray) -> str:
+    """What to do where an object does not stand; a value of --sink is named where it was tried and holds."""
+    height = float(np.ptp(surface.vertices @ normal))
+    for share in _SINKS:
+        sink_m = float(f"{share * height:.2g}")
+        vertices, triangles = _cut(surface.vertices, surface.triangles, normal, sink_m)
+        if not len(triangles):
+            continue
+        foot = _foot(vertices, triangles, normal)
+        stands = _share(vertices, triangles, foot) >= 2 * _LEAST_FOOT
+        if stands and _hanging(vertices, triangles, foot) <= _HANGING:
+            return f"cut off what settles, --sink {sink_m:g}"
+    return (
+        f"cutting off up to {100 * _SINKS[-1]:.0f} % of its height (--sink) does not help; turn it (--up), "
+        "or give the file of one body that stands"
+    )
+
+
+def _hanging(vertices: np.ndarray, triangles: np.ndarray, foot: np.ndarray) -> float:
+    """The share of the volume in bodies that neither stand on a foot (m,) bool nor touch one that does."""
+    import pyvista
+
+    count, piece = connected_components(_graph(triangles, len(vertices)), directed=False)
+    owner = piece[triangles[:, 0]]
+    corners = vertices[triangles] - vertices.mean(axis=0)
+    volumes = np.bincount(owner, np.linalg.det(corners) / 6, count)
+    left = [k for k in np.unique(owner) if volumes[k] > 0]
+    held = [k for k in left if foot[owner == k].any()]
+    if len(left) == 1 or not held:
+        return 0.0
+    drawn = {k: pyvista.PolyData.from_regular_faces(vertices, triangles[owner == k]).clean() for k in left}
+    left = [k for k in left if k not in held]
+    for at in held:  # which grows
+        box = np.reshape(drawn[at].bounds, (3, 2))
+        for k in [k for k in left if _meet(box, np.reshape(drawn[k].bounds, (3, 2)))]:
+            other = np.reshape(drawn[k].bounds, (3, 2))
+            inside = (other[:, 0] >= box[:, 0]).all() and (other[:, 1] <= box[:, 1]).all()
+            if inside or drawn[at].collision(drawn[k], contact_mode=1)[1] > 0:
+                held.append(k)
+                left.remove(k)
+    return float(volumes[left].sum() / np.maximum(volumes, 0.0).sum())
+
+
+def _meet(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two boxes (3, 2) overlap or touch."""
+    return bool((one[:, 0] <= other[:, 1]).all() and (other[:, 0] <= one[:, 1]).all())
+
+
+def _graph(triangles: np.ndarray, count: int) -> coo_matrix:
+    ends = triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel()
+    return coo_matrix((np.ones(len(ends[0])), ends), shape=(count, count))
+
+
+def _righted(surface: ClosedSurface, up: str, normal: np.ndarray) -> np.ndarray:
+    """The stated normal, or that of a flat foot which is tilted against the stated plane; that is said.
+
+    Three numbers are taken at their word.
+    """
+    found = _tilted(surface.vertices, surface.triangles, normal)
+    if found is None:
+        return normal
+    tilt, share, foot = found
+    words = ",".join(f"{x:.4g}" for x in foot)
+    taken, way = (foot, f"--up {','.join(f'{x:g}' for x in normal)} keeps the stated plane")
+    if up not in UPS:
+        taken, way = normal, f"the plane is taken as stated; --up={words} stands it on that foot"
+    warnings.warn(
+        f"{100 * share:.0f} % of the flat foot of '{surface.name}' stands on the plane of --up {up}: it is "
+        f"tilted by {tilt:.1f} degrees in the file"
+        + (f"; the foot's own plane is taken, as by --up={words} ({way})" if up in UPS else f"; {way}"),
+        TiltedFoot,
+        stacklevel=3,
+    )
+    return taken
+
+
+def _tilted(
+    vertices: np.ndarray, triangles: np.ndarray, normal: np.ndarray
+) -> tuple[float, float, np.ndarray] | None:
+    """The angle (degrees) of the largest flat face that an object can stand on, near the stated plane; the
+    share of it on that plane; and the direction (3,) out of it. None where the object stands as stated."""
+    size = float(np.ptp(vertices, axis=0).max())
+    corners = vertices[triangles]
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(facing, axis=1) / 2
+    facing /= np.maximum(2 * area[:, None], 1e-300)
+    hull = ConvexHull(vertices)
+    a, b, c = (vertices[hull.simplices[:, k]] for k in range(3))
+    large = np.argsort(np.linalg.norm(np.cross(b - a, c - a), axis=1))[::-1]
+    planes = hull.equations[large]
+    planes = planes[planes[:, :3] @ normal < -np.cos(np.radians(_TILT))][:50]
+
+    def on(plane: np.ndarray) -> np.ndarray:
+        off = np.abs(vertices @ plane[:3] + plane[3])[triangles].max(axis=1)
+        return (facing @ plane[:3] > _FACING) & (off < _FLAT * size)
+
+    if not len(planes):
+        return None
+    best = max(planes, key=lambda plane: float(area[on(plane)].sum()))
+    foot, stated = on(best), on(np.array([*-normal, float((vertices @ normal).min())]))
+    share = float(area[foot & stated].sum() / max(area[foot].sum(), 1e-300))
+    if area[foot].sum() < _A_FOOT * area.sum() or share >= _ON_IT or area[stated].sum() > area[foot].sum():
+        return None
+    # of the many triangles of a scanned foot the mean is its plane
+    own = -(area[foot, None] * facing[foot]).sum(axis=0)
+    own /= np.linalg.norm(own)
+    return float(np.degrees(np.arccos(np.clip(own @ normal, -1, 1)))), share, own
 
 
 def _foot(vertices: np.ndarray, triangles: np.ndarray, normal: np.ndarray) -> np.ndarray:

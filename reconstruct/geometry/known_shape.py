@@ -15,7 +15,7 @@ from palpate.mechanics.disk.surface_files import ClosedSurface, read_surface
 from palpate.mechanics.errors import ContactError, SurfaceError
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.shape.flat_foot import Standing, standing
+from palpate.mechanics.shape.flat_foot import Standing, direction, standing
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.reconstruction.geometry.registration import (
@@ -59,7 +59,7 @@ def place(
     if not options.shape:
         return place_slab(presses, options, mesh_size_m)
     progress("registration", 0.0)
-    given = read_surface(options.shape, options.unit)
+    given = read_surface(options.shape, options.unit, direction(options.up))
     stood = standing(given, options.up, options.sink_m)
     traces = options.pose == "auto" and set(presses.kinds) == {"press"}
     support = _traced_support(first) if traces else None

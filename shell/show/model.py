@@ -100,6 +100,8 @@ def story(result: Model) -> say.Story:
     yield say.Headline(f"Model of {result.name}: {modulus_words(result)}, Poisson's ratio {nu:g}")
     if parts := parts_words(result):
         yield say.Note(parts)
+    if mended := mended_words(result):
+        yield say.Note(mended)
     yield say.Sentence(f"About as soft as {softness(result.material.young_modulus_pa)}", on=say.PAGE)
     where = file_words(result.path, "MODEL")
     yield say.Next([
@@ -131,6 +133,7 @@ KEYS: tuple[say.Key, ...] = (
     "support_point_m=support.point",
     "support_normal=support.normal",
     ("parts", lambda result: result.provenance.get("parts", "")),
+    ("mended", lambda result: result.provenance.get("mended", "")),
 )
 
 
@@ -172,6 +175,13 @@ def parts_words(model: Model) -> str:
     """What of a mesh that holds several bodies or labels was made one; '' where it is one."""
     parts = model.provenance.get("parts", "")
     return f"the file holds {parts}: all of it is taken for one solid of one modulus" if parts else ""
+
+
+def mended_words(model: Model) -> str:
+    """What was done to a mesh that was not closed; '' where it was."""
+    mended = model.provenance.get("mended", "")
+    volume = f"{1e6 * model.mesh.volumes.sum():.4g} cm³"
+    return f"the file's surface was mended: {mended}; the model encloses {volume}" if mended else ""
 
 
 def modulus_words(model: Model) -> str:

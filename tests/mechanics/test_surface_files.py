@@ -17,7 +17,7 @@ from pyvista import examples
 
 from palpate.mechanics.disk.surface_files import UNITS, ClosedSurface, read_surface
 from palpate.mechanics.errors import SurfaceError
-from palpate.mechanics.shape.flat_foot import PointFoot, standing
+from palpate.mechanics.shape.flat_foot import PointFoot, TiltedFoot, direction, standing
 from palpate.mechanics.shape.tetmesh import box_mesh
 
 SIZE_MM = (60, 50, 40)
@@ -97,6 +97,23 @@ def test_a_wide_hole_is_refused_with_its_place(tmp_path):
     with pytest.raises(SurfaceError, match=r"hole 5\d\.?\d* mm wide at \(1\d\.?\d*, ") as refused:
         read_surface(without(ball, gone, tmp_path / "open.ply"), "mm")
     assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_scan_of_what_stands_on_a_table_is_closed_at_the_table_and_there_alone(tmp_path):
+    """A wavy rim, 2 to 5 mm up: what lies between it and the lowest node belongs to the object."""
+    tube = trimesh.creation.cylinder(radius=30, height=50, sections=96).subdivide_to_size(4)
+    tube.apply_translation([0, 0, 25])
+    x, _, z = tube.triangles_center.T
+    path = without(tube, z < 3.5 + 1.5 * np.sin(x / 8), tmp_path / "scan.stl")
+    low = float(trimesh.load(path).bounds[0, 2])
+    found = read_surface(path, "mm", direction("+z"))
+    assert volume(found) == pytest.approx(np.pi * 30**2 * (50 - low) * 1e-9, rel=5e-3)
+    assert "closed at the support" in found.notes[0]
+    foot = standing(found)
+    assert foot.support_point[2] == pytest.approx(1e-3 * low, abs=1e-9)
+    for up in ("-z", "+x"):
+        with pytest.raises(SurfaceError, match="hole 6"):
+            read_surface(path, "mm", direction(up))
 
 
 def test_triangles_wound_at_random_come_out_outward(tmp_path):
@@ -244,6 +261,48 @@ def test_up_is_a_direction_of_the_file():
     leaning.apply_transform(trimesh.transformations.rotation_matrix(0.5, [1, 0, 0]))
     with pytest.raises(SurfaceError, match=r"flat ones are for --up \+x, -x"):
         standing(surface_of(leaning))
+
+
+def test_a_sink_that_is_proposed_makes_the_object_stand():
+    """Round undersides, one of two bodies, one 6 mm higher: each value is taken as it is said."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)
+    high = ball.copy()
+    high.apply_translation([0.08, 0, 0.006])
+    slender = ball.copy().apply_scale([0.2, 0.2, 1.0])
+    for shell in (ball, slender, trimesh.util.concatenate([ball, high])):
+        thing = surface_of(shell)
+        with pytest.raises(SurfaceError, match="--sink") as refused:
+            standing(thing)
+        cut = standing(thing, sink_m=float(str(refused.value).rsplit("--sink ", 1)[1]))
+        pieces = trimesh.Trimesh(cut.vertices, cut.triangles, process=False).split()
+        lowest = [piece.bounds[0, 2] for piece in pieces]
+        assert lowest == pytest.approx([cut.support_point[2]] * len(pieces), abs=1e-9)
+
+
+def test_a_body_in_the_air_is_refused_and_one_that_touches_what_stands_is_not():
+    def stack(low):
+        block, other = (trimesh.creation.box(extents=(0.06, 0.05, 0.04)) for _ in range(2))
+        other.apply_translation([0.005, 0, low])
+        return surface_of(trimesh.util.concatenate([block, other]))
+
+    with pytest.raises(SurfaceError, match="50 % of their volume touches neither"):
+        standing(stack(0.05))
+    assert len(standing(stack(0.03)).triangles) == 24
+
+
+def test_a_foot_that_is_tilted_in_the_file_is_stood_on_and_said():
+    block = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
+    turn = trimesh.transformations.rotation_matrix(np.radians(7.5), [1, 0.4, 0])
+    block.apply_transform(turn)
+    own = turn[:3, :3] @ [0, 0, 1]
+    with pytest.warns(TiltedFoot, match="0 % of the flat foot .* tilted by 7.5 degrees"):
+        found = standing(surface_of(block))
+    assert found.support_normal == pytest.approx(own, abs=1e-9)
+    reach = (found.vertices - found.support_point) @ own
+    assert reach.min() == pytest.approx(0, abs=1e-9) and reach.max() == pytest.approx(0.04)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", TiltedFoot)
+        standing(surface_of(block), ",".join(map(str, own)))
 
 
 @pytest.mark.parametrize("ending", ["msh", "inp"])

@@ -7,9 +7,13 @@ folder keeps all three away from the caller.
 from __future__ import annotations
 
 import contextlib
+import math
 import os
+import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 
@@ -19,16 +23,25 @@ from palpate.mechanics.errors import MeshError
 
 MOST_TETRAHEDRA = 150_000
 """Beyond it the factorised stiffness of quadratic elements takes more memory than a desktop has."""
+AFFORDABLE = 20_000
+"""So many tetrahedra by volume a model has at most: an organ at 12,000 (28,000 nodes) takes 1.5 GB. The finer
+surface that presses are solved on comes on top, and may take far more."""
 _REGULAR = 2**0.5 / 12
 _ENERGY, _PASSES = 10.0, 80
 """The optimisation stops at this AMIPS energy (3 is ideal), or after so many passes."""
-_TIMEOUT_S = 300.0
-"""For the second try, with one thread and simplified; the first has a third of it."""
+_WORK_S, _WORK_PER_TETRAHEDRON_S, _STILL_S = 60.0, 0.005, 60.0
+"""Processor time that one try may take, and so much more for each tetrahedron (some 1 ms are usual); time by
+the clock after which a mesher that takes no processor time is taken for stuck."""
+_FIRST = 1 / 3
+"""Of it, for the first try; the second has one thread and a simplified drawing."""
 
 _CHILD = """
 import contextlib, ctypes, os, signal, sys
+with contextlib.suppress(ImportError, ValueError, OSError):
+    import resource
+    resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[2]), int(sys.argv[2])))
 if hasattr(signal, "alarm"):
-    signal.alarm(int(sys.argv[2]) + 10)
+    signal.alarm(60 * int(sys.argv[2]))
 with contextlib.suppress(OSError, AttributeError, TypeError):
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)
     if os.getppid() != int(sys.argv[1]):
@@ -39,8 +52,12 @@ settings = {name: given[name].item() for name in given.files if name not in ("ve
 points, cells = pytetwild.tetrahedralize(given["vertices"], given["triangles"], **settings)
 np.savez("mesh.npz", points=points, cells=cells)
 """
-"""Arguments: the parent's id, with which it ends (Linux: PR_SET_PDEATHSIG), and s after which it ends anyway.
-Signals do it, as the mesher lets no Python run beside it."""
+"""Arguments: the parent's id, with which it ends (Linux: PR_SET_PDEATHSIG), and s of processor time after
+which it ends anyway. Signals do it, as the mesher lets no Python run beside it."""
+
+
+class MeshTooDear(MeshError):
+    """A size of tetrahedra takes more work than is allowed; a larger one takes less."""
 
 
 def tetrahedralize(
@@ -57,17 +74,17 @@ def tetrahedralize(
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
     simplify: merge triangles within the envelope first; a drawing as coarse as the tetrahedra needs none,
     and comes out better in half the time. threads: None takes OMP_NUM_THREADS, without it all cores. Raises
-    MeshError where nothing comes back.
+    MeshError where nothing comes back, MeshTooDear where that is for the size.
     """
     check_count(vertices, triangles, edge_m)
+    work_s = _WORK_S + _WORK_PER_TETRAHEDRON_S * tetrahedra(vertices, triangles, edge_m)
     if threads is None:
         threads = int(os.environ.get("OMP_NUM_THREADS", "").split(",")[0] or 0)
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     with temporary_folder("mesh-") as folder:
-        done = None
         # now and then its threads wait for each other for ever, or it refines a drawing for ever that it was
         # not let simplify (seen: an L of 617 points); one thread on a simplified one does neither
-        for count, merges, limit_s in ((threads, simplify, _TIMEOUT_S / 3), (1, True, _TIMEOUT_S)):
+        for count, merges, limit_s in ((threads, simplify, _FIRST * work_s), (1, True, work_s)):
             np.savez(
                 folder / "surface.npz",
                 vertices=np.asarray(vertices, dtype=np.float64),
@@ -79,23 +96,18 @@ def tetrahedralize(
                 num_opt_iter=_PASSES,
                 num_threads=count,
             )
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                done = subprocess.run(
-                    [sys.executable, "-c", _CHILD, str(os.getpid()), str(round(limit_s))],
-                    cwd=folder,
-                    capture_output=True,
-                    timeout=limit_s,
-                    check=False,
-                )
+            ended = _ended(folder, limit_s)
+            if ended is not None:
                 break
-        if done is None:
-            raise MeshError(
-                f"the mesher did not end within {_TIMEOUT_S:.0f} s: use a larger --mesh-size than {edge_m} m"
+        if ended is None:
+            raise MeshTooDear(
+                f"the mesher did not end within {work_s:.0f} s of processor time: use a larger --mesh-size "
+                f"than {edge_m:g} m"
             )
         result = folder / "mesh.npz"
-        if done.returncode or not result.is_file():
-            words = done.stderr.decode(errors="replace").strip().splitlines()
-            raise MeshError(f"the mesher gave no mesh ({words[-1] if words else f'exit {done.returncode}'})")
+        if ended or not result.is_file():
+            words = (folder / "said").read_text(errors="replace").strip().splitlines()
+            raise MeshError(f"the mesher gave no mesh ({words[-1] if words else f'exit {ended}'})")
         with reading(result, MeshError), np.load(result, allow_pickle=False) as found:
             points, cells = found["points"], found["cells"].astype(np.int64)
     if not len(cells):
@@ -110,14 +122,62 @@ def tetrahedralize(
     return points, cells
 
 
-def check_count(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> None:
-    """Raise MeshError where a closed surface would take more than MOST_TETRAHEDRA of that edge length."""
+def _ended(folder: Path, limit_s: float) -> int | None:
+    """The mesher's exit code; None where it took `limit_s` of processor time, or stood still."""
+    words = [sys.executable, "-c", _CHILD, str(os.getpid()), str(math.ceil(limit_s))]
+    with (
+        (folder / "said").open("wb") as said,
+        subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=said) as child,
+    ):
+        try:
+            taken_s, since = 0.0, time.monotonic()
+            while True:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    code = child.wait(1.0)
+                    return None if code in _STOPPED else code
+                now_s = _processor_time(child.pid)
+                if now_s is None or now_s > taken_s:
+                    taken_s, since = now_s or 0.0, since if now_s is None else time.monotonic()
+                # where the system does not tell processor time, the clock has to do
+                if time.monotonic() - since > (limit_s if now_s is None else _STILL_S):
+                    return None
+        finally:
+            child.kill()
+
+
+_STOPPED = tuple(
+    -getattr(signal, name) for name in ("SIGXCPU", "SIGKILL", "SIGALRM") if hasattr(signal, name)
+)
+"""How a mesher ends that took its time."""
+
+
+def _processor_time(process: int) -> float | None:
+    """Processor time, s, of a process; None where the system does not say (no /proc)."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
+    except (OSError, IndexError):
+        return None
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def tetrahedra(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> float:
+    """About how many tetrahedra of an edge length fill a closed surface."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6
-    count = volume / (_REGULAR * edge_m**3)
+    return volume / (_REGULAR * edge_m**3)
+
+
+def affordable(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> float:
+    """The edge length, m, nearest to one that was asked of at most AFFORDABLE tetrahedra."""
+    return edge_m * max(1.0, tetrahedra(vertices, triangles, edge_m) / AFFORDABLE) ** (1 / 3)
+
+
+def check_count(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> None:
+    """Raise MeshError where a closed surface would take more than MOST_TETRAHEDRA of that edge length."""
+    count = tetrahedra(vertices, triangles, edge_m)
     if count > MOST_TETRAHEDRA:
         size = np.ptp(vertices, axis=0)
-        least = (volume / (_REGULAR * MOST_TETRAHEDRA)) ** (1 / 3)
+        least = edge_m * (count / MOST_TETRAHEDRA) ** (1 / 3)
         raise MeshError(
             f"an object of {' x '.join(f'{1e3 * x:.0f}' for x in size)} mm would take about {count:.2g} "
             f"tetrahedra of {1e3 * edge_m:g} mm, {MOST_TETRAHEDRA} are allowed: use --mesh-size "

@@ -178,6 +178,32 @@ def test_an_object_that_would_take_millions_of_tetrahedra_is_refused():
     one_line(error)
 
 
+def test_a_mesh_that_takes_too_much_memory_is_made_coarser_and_that_is_said():
+    """Of the object's volume and size; the edge that is taken is as small as is allowed."""
+    from palpate.reconstruction.steps.s5_mesh.tetwild import AFFORDABLE, affordable, tetrahedra
+
+    mesh = block().mesh
+    points, faces = mesh.points * 0.25 / np.ptp(mesh.points[:, 0]), mesh.surface[:, :3]
+    edge = affordable(points, faces, 0.004)
+    assert edge > 0.004 and tetrahedra(points, faces, edge) == pytest.approx(AFFORDABLE)
+    assert affordable(points, faces, edge * 1.1) == edge * 1.1
+
+
+def test_a_mesher_is_stopped_by_its_work_or_where_it_stands_still(tmp_path, monkeypatch):
+    from palpate.reconstruction.steps.s5_mesh import tetwild
+
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    np.savez(tmp_path / "surface.npz", vertices=np.zeros((1, 3)), triangles=np.zeros((1, 3), dtype=int))
+    loop = "def tetrahedralize(*a, **k):\n    while True: pass"
+    (tmp_path / "pytetwild.py").write_text(loop)
+    assert tetwild._ended(tmp_path, 1.0) is None
+    (tmp_path / "pytetwild.py").write_text("import time\ntime.sleep(3600)")
+    monkeypatch.setattr(tetwild, "_STILL_S", 2.0)
+    assert tetwild._ended(tmp_path, 1e4) is None
+    (tmp_path / "pytetwild.py").write_text("raise SystemExit(3)")
+    assert tetwild._ended(tmp_path, 60.0) == 3
+
+
 def test_a_damaged_mesh_of_the_laboratory_is_not_taken(tmp_path):
     from palpate.scenes.laboratory.mesh import _kept
 

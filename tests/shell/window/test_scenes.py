@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.errors import SceneError
-from palpate.mechanics.model.material import balls_ratio
-from palpate.mechanics.model.model import Model
+from palpate.mechanics.model.material import ObjectMaterial, balls_ratio
+from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.scenes.build import keep, model_of
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import ball_of, load_scene, read_scene, scene_names
@@ -116,6 +117,17 @@ def test_inclusions_are_stiff_where_they_are() -> None:
     assert (ratio[np.linalg.norm(middle - other.centre_m, axis=1) > 0.05] >= 1.0).all()
     assert ratio == pytest.approx(balls_ratio(mesh, [ball_of(ball)]) * balls_ratio(mesh, [ball_of(other)]))
     assert (balls_ratio(mesh, []) == 1.0).all()
+
+
+def test_an_object_that_is_lower_than_a_tip_is_pressed_on_its_top() -> None:
+    plate = Model(
+        mesh=box_mesh((8, 8, 2), (0.04, 0.04, 0.006)).quadratic(),
+        material=ObjectMaterial(5000.0, 0.45),
+        support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
+        tool=Tool(0.005),
+        mesh_size_m=0.005,
+    )
+    assert plate.mesh.points[spread_places(plate, 5), 2] == pytest.approx(0.006)
 
 
 def test_virtual_presses_spread_and_stay_off_rims(block: Model) -> None:

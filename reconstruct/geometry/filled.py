@@ -1,0 +1,54 @@
+"""A solid where a file's triangles enclose none as they are: what their winding number calls inside.
+
+fTetWild takes soups, gaps, crossings and edges of three triangles; what lies inside is decided by the
+generalised winding number (Hu and others 2020, "Fast tetrahedral meshing in the wild"). The solid is taken
+where it follows the triangles; a sheet encloses nothing and stays refused.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from palpate.mechanics.disk.surface_files import ClosedSurface, surface_of
+from palpate.mechanics.errors import MeshError, NotClosed
+from palpate.mechanics.shape.nearest import distance, sample
+from palpate.mechanics.shape.tetmesh import FACES, lone_faces
+from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
+
+_EDGE, _ENVELOPE = 1 / 25, 1e-3
+"""Of the diagonal: the tetrahedra's edge, and how far their surface may lie off the triangles."""
+_NEAR, _FOLLOWED, _SOLID = 0.01, 0.9, 0.02
+"""How near the solid's surface, of the diagonal, triangles lie that it follows, and their least share of the
+area; the solid's least share of its box."""
+
+
+def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> ClosedSurface:
+    """As `surface_of`; where that finds no solid, the one that the triangles' winding number tells.
+
+    Raises NotClosed, as `surface_of` does, where there is none, or it does not follow the triangles.
+    """
+    try:
+        return surface_of(shape, unit, up)
+    except NotClosed as error:
+        refused = error
+    vertices, triangles = refused.vertices, refused.triangles
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    try:
+        points, cells = tetrahedralize(
+            vertices, triangles, edge_m=_EDGE * diagonal, envelope_m=_ENVELOPE * diagonal
+        )
+    except MeshError as error:
+        raise refused from error
+    faces = cells[:, FACES].reshape(-1, 3)[lone_faces(cells)]
+    used, faces = np.unique(faces, return_inverse=True)
+    shell = trimesh.Trimesh(points[used], faces.reshape(-1, 3), process=False)
+    near = distance(shell.vertices, shell.faces, sample(vertices, triangles, 1000)) < _NEAR * diagonal
+    if near.mean() < _FOLLOWED or shell.volume < _SOLID * np.prod(np.ptp(vertices, axis=0)):
+        raise refused
+    name, reason = str(refused).removeprefix("'").split("' ", 1)
+    reason = reason.split("; ")[0]
+    note = f"it {reason}; filled by its winding number, {1e6 * shell.volume:.4g} cm³"
+    return ClosedSurface(np.asarray(shell.vertices), np.asarray(shell.faces, dtype=np.int64), name, (note,))

@@ -1,0 +1,32 @@
+"""Triangles that enclose no solid as they are: what their winding number calls inside, or a refusal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from palpate.mechanics.errors import NotClosed
+from palpate.mechanics.shape.flat_foot import standing
+from palpate.reconstruction.geometry.filled import solid_of
+
+
+@pytest.mark.slow
+def test_a_soup_is_filled_and_stands():
+    """Every triangle by itself, its corners off by micrometres."""
+    block = trimesh.creation.box(extents=(0.06, 0.05, 0.04)).subdivide()
+    corners = np.array(block.triangles).reshape(-1, 3)
+    corners += np.random.default_rng(2).normal(0, 2e-6, corners.shape)
+    soup = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+    found = solid_of(soup)
+    solid = trimesh.Trimesh(found.vertices, found.triangles, process=False)
+    assert solid.volume == pytest.approx(block.volume, rel=0.01)
+    assert "filled" in found.notes[0]
+    assert standing(found).support_point[2] == pytest.approx(-0.02, abs=2e-4)
+
+
+def test_a_sheet_stays_refused():
+    sheet = trimesh.creation.icosphere(subdivisions=2, radius=0.03)
+    sheet.update_faces((sheet.triangles_center[:, 2] > 0.02) | (np.arange(len(sheet.faces)) % 40 == 0))
+    with pytest.raises(NotClosed):
+        solid_of(sheet)
