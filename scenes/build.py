@@ -216,7 +216,12 @@ def _built(
     from palpate.reconstruction.shapes.drawing import decimated
     from palpate.reconstruction.steps.s4_surface import Surface
     from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
-    from palpate.reconstruction.steps.s5_mesh.tetwild import MeshTooDear, affordable
+    from palpate.reconstruction.steps.s5_mesh.tetwild import (
+        AFFORDABLE,
+        AFFORDABLE_ASKED,
+        MeshTooDear,
+        affordable,
+    )
 
     surface = Surface(
         vertices=stood.vertices,
@@ -230,7 +235,8 @@ def _built(
         shape=TrueShape(stood.vertices, stood.triangles),
     )
     asked = scene.mesh_size_m or min(MESH_SIZE_M, float(np.ptp(stood.vertices, axis=0).max()) / LEAST_EDGES)
-    edge = affordable(stood.vertices, stood.triangles, asked)
+    most = AFFORDABLE_ASKED if scene.mesh_size_m else AFFORDABLE
+    edge = affordable(stood.vertices, stood.triangles, asked, most)
     for rest in reversed(range(_SIZES)):
         try:
             sized = MeshingOptions(mesh_size_m=edge)

@@ -23,9 +23,10 @@ from palpate.mechanics.errors import MeshError
 
 MOST_TETRAHEDRA = 150_000
 """Beyond it the factorised stiffness of quadratic elements takes more memory than a desktop has."""
-AFFORDABLE = 20_000
-"""So many tetrahedra by volume a model has at most: an organ at 12,000 (28,000 nodes) takes 1.5 GB. The finer
-surface that presses are solved on comes on top, and may take far more."""
+AFFORDABLE, AFFORDABLE_ASKED = 20_000, 45_000
+"""So many tetrahedra by volume a model has at most by itself, and where the size was asked for: an organ at
+12,000 (28,000 nodes) takes 1.5 GB, at 29,000 2.8 GB and 170 s of processor time. The finer surface that
+presses are solved on comes on top, and may take far more."""
 _REGULAR = 2**0.5 / 12
 _ENERGY, _PASSES = 10.0, 80
 """The optimisation stops at this AMIPS energy (3 is ideal), or after so many passes."""
@@ -167,9 +168,9 @@ def tetrahedra(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> fl
     return volume / (_REGULAR * edge_m**3)
 
 
-def affordable(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> float:
-    """The edge length, m, nearest to one that was asked of at most AFFORDABLE tetrahedra."""
-    return edge_m * max(1.0, tetrahedra(vertices, triangles, edge_m) / AFFORDABLE) ** (1 / 3)
+def affordable(vertices: np.ndarray, triangles: np.ndarray, edge_m: float, most: int = AFFORDABLE) -> float:
+    """The edge length, m, nearest to a wished one of at most so many tetrahedra."""
+    return edge_m * max(1.0, tetrahedra(vertices, triangles, edge_m) / most) ** (1 / 3)
 
 
 def check_count(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> None:
