@@ -65,5 +65,5 @@ EFFECT = NumericalEffect(
     change=_change,
     advice="take a contact that solves the solid (finite elements under the tip) instead of a pressure field "
     "or springs a node; a contact modulus fits one depth alone",
-    hints=SearchHints(hides_strain=True, stands_for_strain=True),
+    hints=SearchHints(hides_strain=True, stands_for_strain=True, any_form=True),
 )
