@@ -57,7 +57,7 @@ class SurfaceError(PalpateError):
     """No closed, oriented surface could be made of the touched points."""
 
 
-class NotClosed(SurfaceError):
+class NotClosedError(SurfaceError):
     """A file's triangles enclose no solid as they are. vertices: (n, 3) m; triangles: (m, 3), as wound in the
     file."""
 

@@ -31,11 +31,13 @@ if TYPE_CHECKING:
     from palpate.mechanics.errors import ContactError as ContactError
     from palpate.mechanics.errors import DeviceError as DeviceError
     from palpate.mechanics.errors import DiagnosisError as DiagnosisError
+    from palpate.mechanics.errors import FewPressesError as FewPressesError
     from palpate.mechanics.errors import FileError as FileError
     from palpate.mechanics.errors import LoudAirError as LoudAirError
     from palpate.mechanics.errors import MeshError as MeshError
     from palpate.mechanics.errors import ModelError as ModelError
     from palpate.mechanics.errors import NoBaseError as NoBaseError
+    from palpate.mechanics.errors import NotClosedError as NotClosedError
     from palpate.mechanics.errors import OptionError as OptionError
     from palpate.mechanics.errors import PalpateError as PalpateError
     from palpate.mechanics.errors import RecordingError as RecordingError
@@ -96,8 +98,9 @@ _OTHERS = {
     "palpate.batching.summary": "Batch",
     "palpate.render.base": "Renderer",
     "palpate.mechanics.errors": (
-        "PalpateError FileError RecordingError ContactError LoudAirError NoBaseError SurfaceError MeshError "
-        "ModelError CacheError OptionError DeviceError SceneError DiagnosisError"
+        "PalpateError FileError RecordingError ContactError FewPressesError LoudAirError NoBaseError "
+        "SurfaceError NotClosedError MeshError ModelError CacheError OptionError DeviceError SceneError "
+        "DiagnosisError"
     ),
 }
 _HOME = _calls() | {name: module for module, names in _OTHERS.items() for name in names.split()}

@@ -21,7 +21,7 @@ from palpate.mechanics.disk.holes import close
 from palpate.mechanics.disk.mesh_parts import Part, bodies, labels
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
-from palpate.mechanics.errors import NotClosed, SurfaceError
+from palpate.mechanics.errors import NotClosedError, SurfaceError
 from palpate.mechanics.quantities import parse_unit
 
 if TYPE_CHECKING:
@@ -118,11 +118,11 @@ def _closed(
     try:
         notes = close(shell, name, UNITS[unit], up)
     except SurfaceError as error:
-        raise NotClosed(str(error), *given) from error
+        raise NotClosedError(str(error), *given) from error
     if shell.volume < 0:
         shell.invert()
     if not shell.volume > 1e-6 * size**3:
-        raise NotClosed(
+        raise NotClosedError(
             f"'{name}' encloses no volume: it is a sheet, or it crosses itself, so that inside and outside "
             "cancel; a solid object is needed: mend it in the program that made the file",
             *given,

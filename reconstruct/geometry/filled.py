@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 
 from palpate.mechanics.disk.surface_files import ClosedSurface, surface_of
-from palpate.mechanics.errors import MeshError, NotClosed
+from palpate.mechanics.errors import MeshError, NotClosedError
 from palpate.mechanics.shape.nearest import distance, sample
 from palpate.mechanics.shape.tetmesh import FACES, lone_faces
 from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
@@ -28,11 +28,11 @@ area; the solid's least share of its box."""
 def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> ClosedSurface:
     """As `surface_of`; where that finds no solid, the one that the triangles' winding number tells.
 
-    Raises NotClosed, as `surface_of` does, where there is none, or it does not follow the triangles.
+    Raises NotClosedError, as `surface_of` does, where there is none, or it does not follow the triangles.
     """
     try:
         return surface_of(shape, unit, up)
-    except NotClosed as error:
+    except NotClosedError as error:
         refused = error
     vertices, triangles = refused.vertices, refused.triangles
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from palpate.mechanics.errors import NotClosed
+from palpate.mechanics.errors import NotClosedError
 from palpate.mechanics.shape.flat_foot import standing
 from palpate.reconstruction.geometry.filled import solid_of
 
@@ -28,5 +28,5 @@ def test_a_soup_is_filled_and_stands():
 def test_a_sheet_stays_refused():
     sheet = trimesh.creation.icosphere(subdivisions=2, radius=0.03)
     sheet.update_faces((sheet.triangles_center[:, 2] > 0.02) | (np.arange(len(sheet.faces)) % 40 == 0))
-    with pytest.raises(NotClosed):
+    with pytest.raises(NotClosedError):
         solid_of(sheet)

@@ -11,13 +11,12 @@ import pytest
 import palpate as pp
 from palpate.cli import main
 from palpate.mechanics.compliance.sites import TouchSites
-from palpate.mechanics.model.files import read_model, write_model
+from palpate.mechanics.model.files import FELT, read_model, write_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.making import no_presses, of_places
 from palpate.render.options import RenderOptions
 from palpate.render.press import Stroke, press
 from palpate.render.surface.felt_surface import (
-    FILE,
     OWN_DEPTH_M,
     PRESSES,
     TOUCHES,
@@ -46,7 +45,7 @@ def test_the_file_holds_what_a_renderer_touches_for_any_program(folder):
     import pyvista
 
     felt_surface(folder)
-    shape = pyvista.read(folder.path / FILE)
+    shape = pyvista.read(folder.path / FELT)
     arrays = touched_surface(folder, RenderOptions()).arrays
     assert np.array_equal(shape.points, arrays.vertices)
     assert np.array_equal(shape.regular_faces, arrays.triangles)
@@ -76,9 +75,9 @@ def test_touches_pin_the_surface_and_far_from_them_the_models_doubt_is_left(fold
 
 def test_the_file_is_read_again_and_never_believed_of_another_mesh_or_touch(folder):
     first = felt_surface(folder)
-    stamp = (folder.path / FILE).stat().st_mtime_ns
+    stamp = (folder.path / FELT).stat().st_mtime_ns
     again = felt_surface(read_model(folder.path))
-    assert (folder.path / FILE).stat().st_mtime_ns == stamp
+    assert (folder.path / FELT).stat().st_mtime_ns == stamp
     assert np.array_equal(first.points, again.points) and np.array_equal(first.normals, again.normals)
     assert np.array_equal(first.uncertainty_m, again.uncertainty_m)
     other = folder.replaced(presses=no_presses(0.005))
@@ -89,7 +88,7 @@ def test_the_file_is_read_again_and_never_believed_of_another_mesh_or_touch(fold
 @pytest.mark.parametrize("damage", ["cut", "nonsense", "gone"])
 def test_a_file_that_is_damaged_or_not_there_is_made_anew(folder, damage):
     first = felt_surface(folder)
-    path = folder.path / FILE
+    path = folder.path / FELT
     if damage == "gone":
         path.unlink()
     else:

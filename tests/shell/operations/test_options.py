@@ -57,7 +57,7 @@ def rooms(monkeypatch):
         monkeypatch.setattr(name, listening)
     rendered = []
 
-    def created(name, model, options, tell):
+    def created(name, model, options, tell, **_):
         rendered.append(options)
         return SimpleNamespace(model=SimpleNamespace(path=None))
 
