@@ -115,9 +115,15 @@ def _box(extents: tuple[float, ...], at: tuple[float, ...] = (0, 0, 0)) -> trime
     return box
 
 
+def _together(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    both = trimesh.util.concatenate(meshes)
+    assert isinstance(both, trimesh.Trimesh)
+    return both
+
+
 def _crossing() -> Drawn:
     """Two blocks that go through one another."""
-    both = trimesh.util.concatenate([_box((80, 30, 30)), _box((30, 80, 40))])
+    both = _together([_box((80, 30, 30)), _box((30, 80, 40))])
     return Drawn(both, 80 * 30 * 30 + 30 * 80 * 40 - 30 * 30 * 30)
 
 
@@ -126,7 +132,7 @@ def _chest() -> Drawn:
     left, right = _organ(3), _organ(4)
     left.apply_translation([70, 0, 0])
     right.apply_translation([-70, 0, 12])
-    return Drawn(trimesh.util.concatenate([left, right]), None)
+    return Drawn(_together([left, right]), None)
 
 
 def _pierced() -> Drawn:
@@ -139,7 +145,7 @@ def _twisted() -> Drawn:
     """A fan of three sheets at one edge stands in a block: that edge has three triangles."""
     block = _box((60, 50, 40))
     fin = trimesh.Trimesh(block.vertices[[1, 5, 3]] * 0.6 + [0, 0, 8], [[0, 1, 2]], process=False)
-    return Drawn(trimesh.util.concatenate([block, fin]), block.volume)
+    return Drawn(_together([block, fin]), block.volume)
 
 
 def _whole(mesh: trimesh.Trimesh, *flags: str) -> Drawn:
