@@ -46,7 +46,8 @@ class WhitenedGroup:
 class Whitener:
     """Weighs residuals and sensitivities (n, 3, k) group by group; groups are sites with their repeats.
 
-    air: (n,) N^2, variance of a component by free air that was followed through the touch.
+    air: (n,) N^2, variance of a component by free air that was followed through the touch. variance, louder:
+    of noise as it adds up along a press; sample_variance: (n,) N^2, of one sample.
     """
 
     def __init__(
@@ -62,13 +63,12 @@ class Whitener:
         (p,) m, of each first touch; by default the options' and what the table states of each. slow: by how
         much more than white the noise counts (its variance), as slow noise adds up along a press."""
         self.touches = forward.touches
-        at_once = self.touches.noise_n**2 + options.floor_n**2
         self.variance = slow * self.touches.noise_n**2 + options.floor_n**2
         before = np.nan_to_num(forward.predict(settings))
-        share = np.sqrt(options.floor_along) * options.floor_share * np.linalg.norm(before, axis=1)
+        unnamed = (options.floor_share * np.linalg.norm(before, axis=1)) ** 2
         bridges, self.air, unbridged = _bridges(self.touches)
-        self.louder = np.sqrt(1 + (share**2 + unbridged) / self.variance)
-        self.sample_variance = at_once + share**2 / options.floor_along + unbridged
+        self.louder = np.sqrt(1 + (options.floor_along * unnamed + unbridged) / self.variance)
+        self.sample_variance = self.touches.noise_n**2 + options.floor_n**2 + unnamed + unbridged
         self.blocks: list[WhitenedGroup] = []
         presses = len(self.touches)
         stated = np.hypot(options.onset_m, self.touches.onset_error_m)
@@ -84,7 +84,7 @@ class Whitener:
         self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(presses)
         brought = 0.0
         for rows, matrix, own in _by_site(self.touches, columns):
-            brought += float((matrix**2).sum() + 3 * self.variance * (self.louder[rows] ** 2).sum())
+            brought += float((matrix**2).sum() + 3 * self.sample_variance[rows].sum())
             matrix /= np.repeat(self.louder[rows], 3)[:, None]
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
             factor = cho_factor(small, lower=True)
