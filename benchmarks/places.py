@@ -1,8 +1,8 @@
 """How far places of sound objects are from the law, over what its bound and the surface's error say.
 
-Of a work folder of `palpate bench diagnose`: every control that is prepared there. Each place's stiffness
-over that of all, with its standard error by noise and repeats; the two factors that make these likeliest
-(mechanics.law_errors.Stiffness), the modulus of each object free.
+Of a work folder of `palpate bench diagnose`: every control that is prepared there. The likelihood of its
+presses by the covariance that a diagnosis weighs with, the modulus fitted, over both factors on a place's own
+width (mechanics.law_errors.Stiffness): the likeliest pair, and its spread over resampled objects.
 """
 
 from __future__ import annotations
@@ -12,23 +12,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from palpate.diagnosis.pipeline import measure, search_of
-from palpate.diagnosis.search.site_stiffness import bound_sd, site_factors, surface_error
+from palpate.diagnosis.search.descent import Descent
+from palpate.diagnosis.search.fit import settings_of
+from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
+from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.errors import OptionError, PalpateError
 from palpate.mechanics.law_errors import Stiffness
 from palpate.mechanics.model.files import read_model
 from palpate.mechanics.progress import Clock, silent
 from palpate.mechanics.recording.recording import read_recording
 
-MOST_ERROR = 0.05
-"""Standard error of a place's stiffness beyond which it says nothing."""
-LEAST_PLACES = 6
-RESAMPLES = 100
+BOUND = (0.0, 0.35, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
+SURFACE = (0.0, 0.2, 0.4, 0.75, 1.2, 2.5)
+"""Factors that are tried."""
+RESAMPLES = 400
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,69 +39,59 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Measure every control, fit, print a row an object."""
-    prepared = sorted(path.name for path in (arguments.work / "models").glob("*-none-*"))
-    found = places_of(prepared, arguments.work)
+    """Weigh every control, print the sum over all."""
+    models = (arguments.work / "models").glob("*-none-*")
+    found = []
+    for path in sorted(path for path in models if path.is_dir()):
+        try:
+            found.append(log_likelihood(arguments.work, path.name))
+        except PalpateError as error:
+            print(f"{path.name}: left out ({error})")
     if not found:
-        raise OptionError(f"{arguments.work}: no prepared control there with {LEAST_PLACES} places that tell")
-    rows = []
-    for name, x in found.items():
-        shares = (x[:, 0].std(), *np.sqrt((x[:, 1:] ** 2).mean(axis=0)))
-        rows.append([name, str(len(x)), *(f"{100 * share:.1f} %" for share in shares)])
-    print(table(["object", "places", "rms off", "of it noise", "bound", "surface"], rows))
-    each = list(found.values())
-    factors, rng = likeliest(each), np.random.default_rng(0)
-    drawn = [likeliest([each[i] for i in rng.integers(0, len(each), len(each))]) for _ in range(RESAMPLES)]
+        raise OptionError(f"{arguments.work}: no control is prepared there")
+    each = np.array(found)
+    total = each.sum(axis=0)
+    print(table(["bound \\ surface", *(f"{b:g}" for b in SURFACE)], [
+        [f"{a:g}", *(f"{x:.0f}" for x in row)] for a, row in zip(BOUND, total - total.max(), strict=True)
+    ]))  # fmt: skip
+    rng = np.random.default_rng(0)
+    drawn = [likeliest(each[rng.integers(0, len(each), len(each))].sum(axis=0)) for _ in range(RESAMPLES)]
     low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
-    used = (Stiffness.bound.value, Stiffness.surface.value)
+    of = (("law's bound", Stiffness.bound.value), ("surface's error", Stiffness.surface.value))
     figures = [
-        Figure(f"factor on the {what}, in use {now:g}", float(f), (float(a), float(b)), "1")
-        for what, now, f, a, b in zip(
-            ("law's bound", "surface's error"), used, factors, low, high, strict=True
-        )
+        Figure(f"likeliest factor on the {what}, in use {used:g}", value, (a, b))
+        for (what, used), value, a, b in zip(of, likeliest(total), low, high, strict=True)
     ]
     for figure, a, b in zip(figures, low, high, strict=True):
-        print(f"{figure.what}: {figure.value:.2f} ({a:.2f} to {b:.2f})")
-    return {"objects": len(each), "places": sum(map(len, each)), "figures": figures}
+        print(f"{figure.what}: {figure.value:g} (95 %: {a:g} to {b:g})")
+    return {"objects": len(each), "figures": figures}
 
 
-def places_of(names: list[str], work: Path) -> dict[str, np.ndarray]:
-    """{recording: (s, 4) a place: stiffness over the law's, its standard error, one standard deviation of the
-    law's bound, the surface's error over the height}; of those that tell."""
-    found = {}
-    for name in names:
-        recording = read_recording(work / f"{name}.toml")
-        options, rules = DiagnoseOptions(), AttributionOptions()
-        try:
-            corrected = measure(
-                recording, read_model(work / "models" / name), options, rules, silent, Clock()
-            )
-        except PalpateError:
-            continue
-        forward = corrected.forward
-        search = search_of(corrected, NuisanceOptions(), rules)
-        t = forward.touches
-        factor, error = site_factors(search.judge([]).found, t)
-        first = np.array([np.flatnonzero(t.site == s)[0] for s in range(t.sites)])
-        rows = np.column_stack([factor, error, bound_sd(forward)[first], surface_error(forward)[first]])
-        rows = rows[error < MOST_ERROR]
-        if len(rows) >= LEAST_PLACES:
-            found[name] = rows
-    return found
+def likeliest(total: np.ndarray) -> tuple[float, float]:
+    """The factors of the greatest log likelihood (BOUND, SURFACE)."""
+    i, j = np.unravel_index(np.argmax(total), total.shape)
+    return BOUND[i], SURFACE[j]
 
 
-def likeliest(objects: list[np.ndarray]) -> np.ndarray:
-    """(2,) factors on the bound and on the surface's error."""
-
-    def missed(logs: np.ndarray) -> float:
-        a, b = np.exp(logs)
-        total = 0.0
-        for factor, error, bound, surface in (x.T for x in objects):
-            variance = error**2 + (a * bound) ** 2 + (b * surface) ** 2
-            level = np.average(factor, weights=1 / variance)
-            total += ((factor - level) ** 2 / variance + np.log(variance)).sum() + np.log(
-                (1 / variance).sum()
-            )
-        return 0.5 * total
-
-    return np.exp(minimize(missed, np.log([1.0, 0.5]), method="Nelder-Mead").x)
+def log_likelihood(work: Path, name: str) -> np.ndarray:
+    """(BOUND, SURFACE) of an object's presses. Raises PalpateError where they cannot be weighed."""
+    recording, model = read_recording(work / f"{name}.toml"), read_model(work / "models" / name)
+    rules = AttributionOptions()
+    corrected = measure(recording, model, DiagnoseOptions(), rules, silent, Clock())
+    search = search_of(corrected, NuisanceOptions(), rules)
+    forward, found = search.forward, search.judge([]).found
+    settings = settings_of(forward, (), found.values, found.onset)
+    left = Descent(forward, search.whitener, (), None).residual(found.values, found.onset)
+    made = np.empty((len(BOUND), len(SURFACE)))
+    for i, bound in enumerate(BOUND):
+        for j, surface in enumerate(SURFACE):
+            widths = NuisanceOptions(law_bound=bound, surface=surface)
+            whitener = Whitener(
+                forward, settings, widths, site_stiffness_sd(forward, widths),
+                slow=forward.touches.noise.variance_inflation,
+            )  # fmt: skip
+            shown = Descent(forward, whitener, (), None).effective(left, found.onset)
+            gram = whitener.gram(np.stack([shown, found.jacobian[:, :, 0]], axis=2)).sum(axis=0)
+            squares = gram[0, 0] - gram[0, 1] ** 2 / gram[1, 1]
+            made[i, j] = -0.5 * squares - whitener.volume.sum()
+    return made
