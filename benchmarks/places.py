@@ -8,6 +8,7 @@ width (mechanics.law_errors.Stiffness): the likeliest pair, and its spread over 
 from __future__ import annotations
 
 import argparse
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,7 @@ from benchmarks.timing import table
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from palpate.diagnosis.pipeline import measure, search_of
 from palpate.diagnosis.search.descent import Descent
-from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
-from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.errors import OptionError, PalpateError
 from palpate.mechanics.law_errors import Stiffness
 from palpate.mechanics.model.files import read_model
@@ -80,16 +79,15 @@ def log_likelihood(work: Path, name: str) -> np.ndarray:
     corrected = measure(recording, model, DiagnoseOptions(), rules, silent, Clock())
     search = search_of(corrected, NuisanceOptions(), rules)
     forward, found = search.forward, search.judge([]).found
-    settings = settings_of(forward, (), found.values, found.onset)
     left = Descent(forward, search.whitener, (), None).residual(found.values, found.onset)
     made = np.empty((len(BOUND), len(SURFACE)))
     for i, bound in enumerate(BOUND):
         for j, surface in enumerate(SURFACE):
             widths = NuisanceOptions(law_bound=bound, surface=surface)
-            whitener = Whitener(
-                forward, settings, widths, site_stiffness_sd(forward, widths),
-                slow=forward.touches.noise.variance_inflation,
-            )  # fmt: skip
+            other = copy.copy(search)
+            other.nuisance, other.site_sd = widths, site_stiffness_sd(forward, widths)
+            other.renew(found)
+            whitener = other.whitener
             shown = Descent(forward, whitener, (), None).effective(left, found.onset)
             gram = whitener.gram(np.stack([shown, found.jacobian[:, :, 0]], axis=2)).sum(axis=0)
             squares = gram[0, 0] - gram[0, 1] ** 2 / gram[1, 1]

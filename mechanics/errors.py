@@ -58,12 +58,12 @@ class SurfaceError(PalpateError):
 
 
 class NotClosedError(SurfaceError):
-    """A file's triangles enclose no solid as they are. vertices: (n, 3) m; triangles: (m, 3), as wound in the
-    file."""
+    """A file's triangles enclose no solid as they are. name: of the file, with which the message begins;
+    vertices: (n, 3) m; triangles: (m, 3), as wound in the file."""
 
-    def __init__(self, message: str, vertices: np.ndarray, triangles: np.ndarray) -> None:
+    def __init__(self, message: str, name: str, vertices: np.ndarray, triangles: np.ndarray) -> None:
         super().__init__(message)
-        self.vertices, self.triangles = vertices, triangles
+        self.name, self.vertices, self.triangles = name, vertices, triangles
 
 
 class MeshError(PalpateError):

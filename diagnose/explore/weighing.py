@@ -129,8 +129,8 @@ LEAST_PRESSES = 6
 SUPPORT_GIVES = 1.5e-5
 """m/N, standard deviation of what a support or its tracing seems to yield by itself."""
 NUISANCE = NuisanceOptions(floor_share=Unnamed.share_exploring.value, latency_s=0.0)
-"""As a diagnosis has them, but that none holds what is small against the force already, and all presses share
-when the force is read."""
+"""As a diagnosis has them, but that 'none' holds what is small against the force already, and that presses
+share when the force is read."""
 LITTLE = 0.1
 """1/m, of compliance for unit modulus, small against a place's own (some 10)."""
 

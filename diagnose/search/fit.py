@@ -101,8 +101,8 @@ DRAWS = 200
 
 
 def covariance(found: Fit, dof: float) -> np.ndarray:
-    """(k, k) of the fit's values: the whitened curvature, widened by the lack of fit, and to
-    what the sites' own pulls scatter (cluster-robust, sites as clusters)."""
+    """(k, k) of the fit's values: the whitened curvature, widened by the lack of fit, and to what the sites'
+    own pulls scatter (cluster-robust, sites as clusters)."""
     total = found.gram.sum(axis=0)
     hessian = total[1:, 1:] + np.diag(found.prior)
     hessian = hessian + 1e-9 * np.diag(np.maximum(np.diag(hessian), 1e-12))

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import cho_factor, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.forward.touches import FOLLOWED
@@ -38,9 +38,21 @@ class WhitenedGroup:
     stiffness and depth law."""
 
     rows: np.ndarray
-    factor: tuple
+    factor: np.ndarray
     halved: np.ndarray
     own: np.ndarray
+
+    @cached_property
+    def told(self) -> np.ndarray:
+        """Of the place's own nuisances, unit before, the variance that the readings tell."""
+        unit = np.eye(len(self.factor))[:, self.own]
+        left = (solve_triangular(self.factor, unit, lower=True) ** 2).sum(axis=0)
+        return np.maximum(1 - left, _LEAST)
+
+    @property
+    def nuisances(self) -> np.ndarray:
+        """(k, 3 r) N, the change of force a standard deviation of each, over how much louder its rows are."""
+        return self.factor @ self.halved
 
 
 class Whitener:
@@ -87,8 +99,8 @@ class Whitener:
             brought += float((matrix**2).sum() + 3 * self.sample_variance[rows].sum())
             matrix /= np.repeat(self.louder[rows], 3)[:, None]
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
-            factor = cho_factor(small, lower=True)
-            halved = solve_triangular(factor[0], matrix.T, lower=True)
+            factor = cholesky(small, lower=True)
+            halved = solve_triangular(factor, matrix.T, lower=True)
             self.blocks.append(WhitenedGroup(rows, factor, halved, own))
         self.explained = brought / float(self.counts().sum())
         """N^2, the mean square of a sample's 3-vector that noise and nuisances bring about."""
@@ -99,11 +111,8 @@ class Whitener:
         The place that misses most is left out: a touch there may have slipped."""
         each = []
         for block in self.blocks:
-            found = self._nuisances(block, residual)[block.own]
-            lower = np.tril(block.factor[0])
-            unit = np.eye(len(lower))[:, block.own]
-            left = (solve_triangular(lower, unit, lower=True) ** 2).sum(axis=0)
-            each.append(np.mean(found**2 / np.maximum(1 - left, _LEAST)))
+            found = self._likeliest(block, residual)[block.own]
+            each.append(np.mean(found**2 / block.told))
         return float((np.sum(each) - np.max(each)) / max(len(each) - 1, 1))
 
     def misfit(self, residual: np.ndarray) -> np.ndarray:
@@ -111,18 +120,18 @@ class Whitener:
         the variance of one sample, and of these: about three a sample where the noise is as said."""
         squares = []
         for block in self.blocks:
-            found, loud = self._nuisances(block, residual), self.louder[block.rows]
-            moved = (np.tril(block.factor[0]) @ block.halved).T @ found
+            found, loud = self._likeliest(block, residual), self.louder[block.rows]
+            moved = block.nuisances.T @ found
             left = residual[block.rows] - moved.reshape(-1, 3) * loud[:, None]
             each = (left**2).sum(axis=1) / self.sample_variance[block.rows]
             squares.append(each.sum() + found @ found)
         return np.array(squares)
 
-    def _nuisances(self, block: WhitenedGroup, residual: np.ndarray) -> np.ndarray:
-        """(k,) the likeliest, in standard deviations."""
+    def _likeliest(self, block: WhitenedGroup, residual: np.ndarray) -> np.ndarray:
+        """(k,) nuisances, in standard deviations."""
         loud = self.louder[block.rows][:, None]
         pulled = block.halved @ (residual[block.rows] / loud).reshape(-1) / self.variance
-        return solve_triangular(np.tril(block.factor[0]), pulled, lower=True, trans="T")
+        return solve_triangular(block.factor, pulled, lower=True, trans="T")
 
     @property
     def groups(self) -> int:
@@ -148,7 +157,7 @@ class Whitener:
         """(n, 3, count) N, residuals drawn from the covariance; 0 at rows that do not count."""
         out = np.zeros((len(self.louder), 3, count))
         for block in self.blocks:
-            nuisances = np.tril(block.factor[0]) @ block.halved
+            nuisances = block.nuisances
             sizes = (len(nuisances), count)
             noise = np.sqrt(self.variance) * rng.normal(size=(3 * len(block.rows), count))
             noise += nuisances.T @ rng.normal(size=sizes)
@@ -186,7 +195,7 @@ class Whitener:
     def volume(self) -> np.ndarray:
         """(g,) half the logarithm of the determinant of each group's covariance, N^2."""
         loud = np.log(self.louder * np.sqrt(self.variance))
-        each = [3 * loud[b.rows].sum() + np.log(np.diag(b.factor[0])).sum() for b in self.blocks]
+        each = [3 * loud[b.rows].sum() + np.log(np.diag(b.factor)).sum() for b in self.blocks]
         return np.array(each)
 
     def counts(self) -> np.ndarray:

@@ -89,7 +89,6 @@ def _fitted(curve: MachineCycle, onset: float, timed: bool) -> tuple[MachineCycl
     columns = np.column_stack([(u - u[first]) / max(span[0], 1e-300), (t - t[first]) / max(span[1], 1e-300)])
     both = timed and back.sum() >= _ROWS  # on the way in alone a drift is a slope
     air = way_in | back if both else way_in
-    best = _plain(curve)
     kept = [0, 1] if both else [0]
     top = float(force[peak] - np.median(force[way_in]))
     while kept:
@@ -100,16 +99,16 @@ def _fitted(curve: MachineCycle, onset: float, timed: bool) -> tuple[MachineCycl
         covariance = variance * np.linalg.pinv(basis.T @ basis)
         sure = np.abs(values[1:]) / np.sqrt(np.maximum(np.diag(covariance)[1:], 1e-300))
         there = (sure > _SURE) & (np.abs(values[1:]) > _MATTERS * top)
-        if there.all() and abs(values[1:].sum() / span[0]) * np.median(u[peak] - u[way_in]) > _MOST * top:
-            break
         if there.all():
+            if abs(values[1:].sum() / span[0]) * np.median(u[peak] - u[way_in]) > _MOST * top:
+                break  # a contact's own
             moved = columns[:, kept] @ values[1:]
             error = np.sqrt(float(covariance[1:, 1:].sum()))
             free = dataclasses.replace(curve, force=force - moved)
             later = dataclasses.replace(free, force=free.force + error * columns[:, 0])
             return free, float(values[1:].sum() / span[0]), later
         kept = [k for k, good in zip(kept, there, strict=True) if good]
-    return best
+    return _plain(curve)
 
 
 def _bends(u: np.ndarray, force: np.ndarray) -> bool:

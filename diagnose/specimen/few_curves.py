@@ -142,10 +142,7 @@ def material_of_few(
         curves=len(own),
         held_out="blocks of each way in",
         young_modulus_pa=float(own.mean()),
-        young_modulus_ci95_pa=_with_loop(
-            lost,
-            interval,
-        ),
+        young_modulus_ci95_pa=_with_loop(lost, interval),
         law=approach.law,
         error=approach.error,
         verdict=f"{approach.law} follows the way in best; {gone}",

@@ -114,7 +114,7 @@ def _closed(
         raise SurfaceError(f"'{name}' holds no triangles: export the object as a surface of triangles")
     size = float(np.ptp(shell.vertices, axis=0).max())
     _check_size(name, size, unit)
-    given = np.array(shell.vertices) * UNITS[unit], np.array(shell.faces, dtype=np.int64)
+    given = name, np.array(shell.vertices) * UNITS[unit], np.array(shell.faces, dtype=np.int64)
     try:
         notes = close(shell, name, UNITS[unit], up)
     except SurfaceError as error:

@@ -65,7 +65,6 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
     if sink_m:
         vertices, triangles = _cut(vertices, triangles, normal, sink_m)
     foot = _foot(vertices, triangles, normal)
-    hanging = _hanging(vertices, triangles, foot)
     if _share(vertices, triangles, foot) < _LEAST_FOOT:
         others = [
             u for u in UPS
@@ -75,6 +74,7 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
         raise SurfaceError(
             f"'{surface.name}' has no flat foot to stand on with {up} up: {hint}{_way(surface, normal)}"
         )
+    hanging = _hanging(vertices, triangles, foot)
     if hanging > _HANGING:
         raise SurfaceError(
             f"'{surface.name}' is of several bodies, and {100 * hanging:.0f} % of their volume touches "

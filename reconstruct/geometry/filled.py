@@ -48,7 +48,8 @@ def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> Close
     near = distance(shell.vertices, shell.faces, sample(vertices, triangles, 1000)) < _NEAR * diagonal
     if near.mean() < _FOLLOWED or shell.volume < _SOLID * np.prod(np.ptp(vertices, axis=0)):
         raise refused
-    name, reason = str(refused).removeprefix("'").split("' ", 1)
-    reason = reason.split("; ")[0]
+    reason = str(refused).removeprefix(f"'{refused.name}' ").split("; ")[0]
     note = f"it {reason}; filled by its winding number, {1e6 * shell.volume:.4g} cm³"
-    return ClosedSurface(np.asarray(shell.vertices), np.asarray(shell.faces, dtype=np.int64), name, (note,))
+    return ClosedSurface(
+        np.asarray(shell.vertices), np.asarray(shell.faces, dtype=np.int64), refused.name, (note,)
+    )

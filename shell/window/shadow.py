@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from palpate.mechanics.frames import tangents
 from palpate.show.colours import COLOURS
 
-FLOOR_COLOUR = np.array([int(COLOURS["support"][k : k + 2], 16) for k in (1, 3, 5)], dtype=float)
+FLOOR_COLOUR = np.array(pyvista.Color(COLOURS["support"]).int_rgb, dtype=float)
 DARKEST = 0.5
 _DIRECTIONS, _ANGLES, _NEAR_RINGS, _FAR_RINGS = 96, 72, 28, 12
 

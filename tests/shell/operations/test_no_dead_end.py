@@ -99,10 +99,10 @@ def test_open_takes_every_flag_that_a_refusal_of_it_names(sources):
     assert not [each for each in met if each[0] not in taken]
 
 
-@pytest.mark.parametrize(
-    "fault", [pytest.param(f, marks=[pytest.mark.release] * (f not in EVERYDAY)) for f in MENDED]
-)
-def test_a_grave_finding_is_gone_by_a_way_that_it_names(fault, tmp_path, monkeypatch):
+@pytest.fixture
+def reached(monkeypatch) -> type[Exception]:
+    """What is raised where a command comes to the reconstruction."""
+
     class Reached(Exception):
         pass
 
@@ -110,6 +110,13 @@ def test_a_grave_finding_is_gone_by_a_way_that_it_names(fault, tmp_path, monkeyp
         raise Reached
 
     monkeypatch.setattr("palpate.operations.reconstruct.reconstruct", reconstruct)
+    return Reached
+
+
+@pytest.mark.parametrize(
+    "fault", [pytest.param(f, marks=[pytest.mark.release] * (f not in EVERYDAY)) for f in MENDED]
+)
+def test_a_grave_finding_is_gone_by_a_way_that_it_names(fault, tmp_path, reached):
     recording = FAULTS[fault].change(explore_cylinder()[0], np.random.default_rng(0))
     file = write_recording(tmp_path / "wrong.csv", recording)
     try:
@@ -117,7 +124,7 @@ def test_a_grave_finding_is_gone_by_a_way_that_it_names(fault, tmp_path, monkeyp
     except RecordingError as error:
         said = str(error)
     words = shlex.split(re.search(r"palpate open [^'\n]*", said)[0])
-    with pytest.raises(Reached):
+    with pytest.raises(reached):
         main([*words[1:], "--report", "none"])
 
 
@@ -131,21 +138,13 @@ def words_with(recording, way, folder) -> list[str]:
     "fault",
     [pytest.param(f, marks=[pytest.mark.release] * (f not in ("gaps", "rate said a tenth"))) for f in FAULTS],
 )
-def test_every_command_that_a_refused_file_is_told_gets_further(fault, tmp_path, monkeypatch, capsys):
+def test_every_command_that_a_refused_file_is_told_gets_further(fault, tmp_path, reached, capsys):
     """To the reconstruction; a file that is to be named stays aside."""
-
-    class Reached(Exception):
-        pass
-
-    def reconstruct(*_, **__):
-        raise Reached
-
-    monkeypatch.setattr("palpate.operations.reconstruct.reconstruct", reconstruct)
     wrong = FAULTS[fault].change(explore_cylinder()[0], np.random.default_rng(0))
     file = str(write_recording(tmp_path / "wrong.csv", wrong))
     try:
         code = main(["open", file, "--report", "none"])
-    except Reached:
+    except reached:
         return
     assert code in (1, 2)
     said = capsys.readouterr()
@@ -155,7 +154,7 @@ def test_every_command_that_a_refused_file_is_told_gets_further(fault, tmp_path,
     for command in (each for each in told if "SHAPE.stl" not in each):
         try:
             code = main([*shlex.split(command), "--report", "none"])
-        except Reached:
+        except reached:
             continue
         # ten times too large is no unit: read as the nearest one, it is checked, and says what is wrong
         assert fault == "position x 10" and code == 1 and "GRAVE" in capsys.readouterr().out
