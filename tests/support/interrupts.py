@@ -244,7 +244,7 @@ class _Place:
             wrong.append(f"processes left: {orphans}")
         wrong += _of_results(self.out, before)
         if how == "SIGKILL":
-            self._next(name)
+            self._next()
         return wrong + self._left(family)
 
     def _begun(self, name: str) -> tuple[subprocess.Popen[bytes], Any]:
@@ -255,10 +255,12 @@ class _Place:
         )  # fmt: skip
         return process, said
 
-    def _next(self, name: str) -> None:
-        """The next command that writes to the same place: one that compiles nothing."""
-        argv = ("export", str(self.model), "--to", "stl", "-o", str(self.out / "next.stl"))
-        subprocess.run(module_command("palpate", *argv), env=self._environment, capture_output=True)
+    def _next(self) -> None:
+        """The next command that writes to the same place, the folder of a page's pictures too: one that
+        compiles nothing."""
+        for folder in {self.out, *(left.parent for left in self.out.rglob(".palpate-*"))}:
+            argv = ("export", str(self.model), "--to", "stl", "-o", str(folder / "next.stl"))
+            subprocess.run(module_command("palpate", *argv), env=self._environment, capture_output=True)
 
     def _left(self, family: list[int]) -> list[str]:
         """Temporary files that are still there, in the order of their names."""
