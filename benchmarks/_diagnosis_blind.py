@@ -194,10 +194,11 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
             "probability": {e["name"]: e["probability"] for e in data["effects"]},
             "widening": dict(factors()),
             "detectable_n": {e["name"]: e["detectable_n"] for e in data["effects"]},
-            "scores": {n: [s.evidence, s.share] for n, s in result.attribution.scores.items()},
+            "scores": {n: [s.evidence, s.foretold] for n, s in result.attribution.scores.items()},
             "picked": list(result.attribution.picked),
             "later_scores": [
-                {n: [s.evidence, s.share] for n, s in step.items()} for step in result.attribution.steps[1:]
+                {n: [s.evidence, s.foretold] for n, s in step.items()}
+                for step in result.attribution.steps[1:]
             ],
             "bic": best_by_bic(result.attribution),
             "regression_gap_n": regressed_gap(result.forward, result.residual_before),

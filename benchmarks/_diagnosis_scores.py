@@ -61,7 +61,7 @@ def answer_of(item: dict[str, Any]) -> Answer:
     elif named:
         first = named[0]
     else:
-        first = "unknown" if "unknown" in kind or candidates else "none"
+        first = "unknown" if "unknown" in kind else "none"
     return Answer(kind, named, candidates, first)
 
 

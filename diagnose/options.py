@@ -71,7 +71,11 @@ class AttributionOptions:
     shape_gain: float = option(
         12.0, "gain in log likelihood from which sites differ by more than their shape may"
     )
-    unknown_chi: float = option(1.9, "lack of fit (whitened mean square) beyond which a remainder is unknown")
+    unknown_chi: float = option(
+        1.9,
+        "lack of fit beyond which a remainder is unknown: mean square of samples over the noise's, or rms of "
+        "places over their widths",
+    )
 
     def within(self, most: int) -> AttributionOptions:
         """The same with at most so many effects in an answer, where nothing else was asked for."""

@@ -3,8 +3,9 @@
 Of every case that was judged blind: each effect of a step with its evidence (log10 of the gain in log
 likelihood). What is there is told from what is not by a logistic regression with a ridge. Where nothing that
 is there is left to be named, all effects are false: a control's, and those of the steps after all true ones
-were picked. Else only the true ones count, where the fit found them at all (evidence above 10, something of
-the gap closed); after a wrong pick nothing does. What closes nothing is never named, so it does not count.
+were picked. Else only the true ones count, where the fit found them at all (evidence above 10, and gained at
+places left out); after a wrong pick nothing does. What gains nothing there is never named, so it does not
+count. The lapse is the share of first picks at log odds above SURE that were wrong.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ FOUND = 10.0
 
 
 KEYS = ("offset", "evidence")
+SURE = 4.0
+"""Log odds from which a pick counts for the lapse."""
 BORDER = 4.0
 """Log odds within which a row is shown."""
 
@@ -62,6 +65,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     ]
     print(table(["log odds", "there", "effect", "log10 gain", "case"], lines))
     values = "\n".join(f"{n} = {v:.2f}" for n, v in zip(KEYS, fitted, strict=True))
+    wrong = [pick for item in opened for pick in sure_picks(item)]
+    values += f"\nlapse = {(sum(wrong) + 1) / (len(wrong) + 2):.2f}"  # Laplace's rule of succession
     write_fitted("diagnose_weights", arguments, f"[weights]\n{values}")
     return {
         "cases": len(opened),
@@ -80,14 +85,23 @@ def rows_of(opened: dict[str, Any]) -> list[tuple[str, str, float, bool]]:
     left = {_phenomenon(name) for name in opened["case"]["tested"]}
     steps = [verdict.get("scores", {}), *verdict.get("later_scores", ())]
     for scores, pick in zip_longest(steps, verdict.get("picked", ())):
-        for name, (gain, closes) in (scores or {}).items():
+        for name, (gain, foretold) in (scores or {}).items():
             there = _phenomenon(name) in left
-            if np.isfinite(gain) and closes > 0 and (not left or (there and gain > FOUND)):
+            if np.isfinite(gain) and foretold > 0 and (not left or (there and gain > FOUND)):
                 found.append((opened["key"], name, float(np.log10(max(gain, 1.0))), there))
         if pick is None or _phenomenon(pick) not in left:
             break
         left.discard(_phenomenon(pick))
     return found
+
+
+def sure_picks(opened: dict[str, Any]) -> list[bool]:
+    """[whether it was wrong] of one judged case's first pick, where that was sure."""
+    verdict = opened["verdict"]
+    picks = [p for p in verdict.get("picked", ())[:1] if p in verdict["scores"]]
+    true = {_phenomenon(name) for name in opened["case"]["tested"]}
+    sure = [p for p in picks if WEIGHTS.log_odds(verdict["scores"][p][0]) > SURE]
+    return [_phenomenon(p) not in true for p in sure]
 
 
 def _phenomenon(name: str) -> str:

@@ -24,6 +24,7 @@ from palpate.diagnosis.search.descent import Descent
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit, parameter_intervals, settings_of
 from palpate.diagnosis.search.limits import SEEN
+from palpate.diagnosis.search.rivals import Explanation, likeliest, names_of, without
 from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours, never_worse
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
@@ -50,9 +51,10 @@ COMMON_ERROR = Level.simulator.value
 
 @dataclass(frozen=True)
 class Numerics:
-    """named: strongest first. candidates: not told apart from them.
+    """named: strongest first. candidates: what else may be there. explanations: every set that was weighed,
+    the likeliest first.
 
-    By name: keys of every effect that was looked at; intervals at 95 %; probability, gain, confidence_set_p;
+    By name: keys of every effect that was looked at; intervals at 95 %; probability, gain;
     detectable_n, N rms from which these presses show it at all; values, of its parameters, where it is named;
     force, the (n, 3) N that it adds: of those named to the law with the others, of the others to the law
     alone, of a fit that has not seen the place ("all": of those named together). law: (n, 3) N, our law at
@@ -61,6 +63,7 @@ class Numerics:
 
     named: tuple[str, ...]
     candidates: tuple[str, ...]
+    explanations: tuple[Explanation, ...]
     keys: dict[str, dict[str, Any]]
     intervals: dict[str, dict[str, Any]]
     probability: dict[str, float]
@@ -72,7 +75,6 @@ class Numerics:
     reasons: tuple[str, ...]
     gain: dict[str, float] = field(default_factory=dict)
     detectable_n: dict[str, float] = field(default_factory=dict)
-    confidence_set_p: dict[str, float] = field(default_factory=dict)
     values: dict[str, np.ndarray] = field(default_factory=dict)
     found: Attribution | None = None
 
@@ -130,11 +132,13 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
         )
     limits = {n: max(x, LEAST_SHARE * typical) for n, x in _limits(search, found, tried).items()}
     forward.touches = t
-    rivals = tuple(r for r in found.rivals if r not in kept.names)
+    explanations = without(found.explanations, {*found.chosen} - {*kept.names})
+    likely = names_of(likeliest(explanations, 1 - rules.doubt))
+    candidates = tuple(n for n in likely if n not in kept.names)
     return Numerics(
-        kept.names, rivals if kept.names else (), keys, intervals, probability, force, law, together,
+        kept.names, candidates, explanations, keys, intervals, probability, force, law, together,
         law_of(best.found), remainder, tuple(reasons), gain, limits,
-        found.confidence_set_p, {name: best.found.of(name) for name in kept.names}, found,
+        {name: best.found.of(name) for name in kept.names}, found,
     )  # fmt: skip
 
 

@@ -30,6 +30,7 @@ from palpate.diagnosis.other_simulator.paired_presses import Sides, named_numeri
 from palpate.diagnosis.other_simulator.result import Part, SimulatedGap, Simulator, advice_of
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.search.gaps import closed_share_ci95
+from palpate.diagnosis.search.rivals import Explanation, joint, likeliest, names_of
 from palpate.diagnosis.verdict.answer import Answer, Findings
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
 from palpate.diagnosis.verdict.where import locate
@@ -99,6 +100,7 @@ class _Weighed:
     asked: Asked
     seed: int
     resamples: int
+    doubt: float
     reality: Diagnosis
     sides: Sides
     numerics: Numerics
@@ -142,8 +144,8 @@ def _weighed(
     if weighing.gap_n(touched) ** 2 - weighing.gap_n(end) ** 2 < (rules.smallest * reality.noise_n) ** 2:
         real = dataclasses.replace(real, names=())  # true of the object, and no part of this gap
     return _Weighed(
-        asked, options.seed, options.bootstrap, reality, sides, numerics, real, wrong, measured, weighing,
-        gaps,
+        asked, options.seed, options.bootstrap, rules.doubt, reality, sides, numerics, real, wrong, measured,
+        weighing, gaps,
     )  # fmt: skip
 
 
@@ -185,7 +187,8 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         gap_closed_ci95=interval,
         kind=answer.kind,
         effects=tuple(names),
-        candidates=tuple(dict.fromkeys(c for c in candidates if c not in names)),
+        candidates=answer.rivals,
+        explanations=_explanations(w, names),
         parts=parts,
         unexplained=1 - explained,
         unexplained_n=math.sqrt(max(whole * (1 - explained), 0.0)),
@@ -208,6 +211,16 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         gaps=w.gaps,
         simulated=w.sides.raw,
     )  # fmt: skip
+
+
+def _explanations(w: _Weighed, names: list[str]) -> tuple[Explanation, ...]:
+    """The smallest collection of sets that holds all but `doubt` of the posterior, of numerics and reality
+    together; what the samples or the recording's values show of themselves is in each."""
+    real = w.reality.explanations if w.real.names else ()
+    sets = joint(w.numerics.explanations, real or [Explanation((), 1.0)])
+    weighed = names_of(sets)
+    sets = joint([Explanation(tuple(n for n in names if n not in weighed), 1.0)], sets)
+    return likeliest(sets, 1 - w.doubt)
 
 
 def _by_size(w: _Weighed) -> list[str]:
@@ -258,7 +271,6 @@ def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:
             name, numerical(name).domain, numerics.probability[name], start + numerics.force[name],
             numerics.keys[name], gain=numerics.gain.get(name, 0.0),
             intervals=numerics.intervals.get(name, {}),
-            confidence_set_p=numerics.confidence_set_p.get(name, float("nan")),
             detectable_n=numerics.detectable_n.get(name, float("nan")),
         )
         for name in NAMES if name in numerics.keys and name in numerics.force

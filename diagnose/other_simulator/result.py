@@ -17,6 +17,7 @@ from palpate.diagnosis.other_simulator.against_law import Numerics
 from palpate.diagnosis.other_simulator.declared_parameters import Stated
 from palpate.diagnosis.other_simulator.frame import AS_RECORDED
 from palpate.diagnosis.other_simulator.gap_decomposition import StatedParameter
+from palpate.diagnosis.search.rivals import Explanation
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry, answers_json
 from palpate.diagnosis.verdict.where import Where
 from palpate.mechanics.presses.table import Presses
@@ -133,11 +134,12 @@ class SimulatedGap(Result):
     """Where, why and how far another simulator's force leaves the measured one. Gaps: N, rms of the 3-vector
     over contact samples, the parts at places that their fits have not seen.
 
-    parts: by name of PARTS; unexplained: the share that is left, unexplained_n in N; of it noise_share is the
-    sensor's noise and touch_share what the object's own first touches take. effects: what changes the force
-    most first. reality: today's diagnosis of our ideal model. gaps: (n, 3) N, local frames of `touches`, as
-    the parts are taken off, "simulated" first. notes: what was told of the forces. mended: where it was run
-    again. `plot`: the parts as shares. `show`: the object coloured by the gap.
+    explanations: the smallest collection of sets of causes that holds nine tenths of the posterior, the
+    likeliest first. parts: by name of PARTS; unexplained: the share that is left, unexplained_n in N; of it
+    noise_share is the sensor's noise and touch_share what the object's own first touches take. effects: what
+    changes the force most first. reality: today's diagnosis of our ideal model. gaps: (n, 3) N, local frames
+    of `touches`, as the parts are taken off, "simulated" first. notes: what was told of the forces. mended:
+    where it was run again. `plot`: the parts as shares. `show`: the object coloured by the gap.
     """
 
     simulator: Simulator
@@ -149,6 +151,7 @@ class SimulatedGap(Result):
     kind: str
     effects: tuple[str, ...]
     candidates: tuple[str, ...]
+    explanations: tuple[Explanation, ...]
     parts: Mapping[str, Part]
     unexplained: float
     unexplained_n: float

@@ -22,8 +22,8 @@ import numpy as np
 
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.leave_one_out import JudgedSet
-from palpate.diagnosis.search.naming import Score
-from palpate.diagnosis.search.rivals import confidence_set_p, of_one_phenomenon, rivals_of
+from palpate.diagnosis.search.naming import Score, beside_best
+from palpate.diagnosis.search.rivals import Choice, Explanation, of_one_phenomenon, posterior
 from palpate.mechanics.effects.base import Effect, Scope
 from palpate.mechanics.progress import Progress, silent
 
@@ -99,10 +99,9 @@ class Attribution:
 
     base: what effects were added to (finite strain in it where the data prefer it). ideal: linear elasticity
     alone; deep: neo-Hookean alone. scores: of every single effect on the base. chosen: names, strongest
-    first. rivals: names not told apart from a chosen one. final: the chosen set. steps, picked: what each
-    step looked like and what it took. finite_strain_gain: log likelihood, in the final set;
-    finite_strain_closes: N^2, by how much it lowers there the sum of held-out squares. confidence_set_p:
-    p value by which each effect, and 'none', is in the first step's model confidence set.
+    first. final: the chosen set. explanations: every set of causes that was weighed, the likeliest first.
+    steps, picked: what each step looked like and what it took. finite_strain_gain: log likelihood, in the
+    final set; finite_strain_closes: N^2, by how much it lowers there the sum of held-out squares.
     """
 
     base: JudgedSet
@@ -110,25 +109,19 @@ class Attribution:
     deep: JudgedSet
     scores: dict[str, Score]
     chosen: tuple[str, ...]
-    rivals: tuple[str, ...]
     final: JudgedSet
+    explanations: tuple[Explanation, ...]
     steps: tuple[dict[str, Score], ...]
     picked: tuple[str, ...]
     finite_strain_gain: float
     finite_strain_closes: float
-    confidence_set_p: dict[str, float]
 
     @property
-    def scored(self) -> dict[str, tuple[Score, float]]:
-        """{name: (score, p value of the confidence set)} of the first step; what only a later one tried, as
-        another law of a phenomenon, with that step's, where it was chosen."""
-        later = {
-            name: (step[name], confidence_set_p(step)[name])
-            for step in reversed(self.steps[1:])
-            for name in self.chosen
-            if name in step
-        }
-        return later | {name: (score, self.confidence_set_p[name]) for name, score in self.scores.items()}
+    def scored(self) -> dict[str, Score]:
+        """{name: score} of the first step; what only a later one tried, as another law of a phenomenon, with
+        that step's, where it was chosen."""
+        later = {n: step[n] for step in reversed(self.steps[1:]) for n in self.chosen if n in step}
+        return later | self.scores
 
 
 def attribute(
@@ -138,7 +131,7 @@ def attribute(
     seen: frozenset[str] = frozenset(),
     progress: Progress = silent,
 ) -> Attribution:
-    """Forward selection with backward check of effects to be tried; rivals of the first are declared.
+    """Forward selection with backward check of effects to be tried, and how likely each set is.
 
     seen: names that are known to be there from elsewhere: they are taken first, and stay.
     """
@@ -149,6 +142,7 @@ def attribute(
     current = base
     chosen: list[str] = []
     steps: list[dict[str, Score]] = []
+    choices: list[Choice] = []
     for step in range(search.options.greatest_number):
         scores: dict[str, Score] = {}
         for i, effect in enumerate(effects):
@@ -167,25 +161,27 @@ def attribute(
         if not scores:
             break
         first = not chosen
-        for score in list(scores.values()):
-            if score.probability > search.options.sure and not search.passes(score, first=first):
-                scores[score.name] = _reexamined(search, score, current)
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
-        passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
+        able = [s for s in scores.values() if search.able(s, first=first) and s.size_n > least]
         if search.forward.measured and search.sideways_off(current):
-            passing = _not_blind_to_slip(search, passing)
+            able = _not_blind_to_slip(search, able)
+        log_odds = beside_best(able)
         known = [scores[n] for n in sorted(seen) if n in scores]
-        passing = [s for s in known if s.size_n > search.smallest_n] or passing
+        known = [s for s in known if s.size_n > search.smallest_n]
+        passing = known or [s for s in able if s.probability > search.options.sure]
         if not passing:
             pair = None
             if step + 2 <= search.options.greatest_number:
                 pair = _paired(search, _able_together(search, effects, current, scores), current)
             if pair is None:
+                choices.append(Choice(log_odds, ()))
                 break
-            chosen += [n for n in pair.found.names if n not in current.found.names]
-            search.renew(pair.found)
-            current, strain_gain, strain_closes = _with_strain(search, pair.found.effects)
+            names = tuple(e.name for e in pair.added)
+            choices.append(Choice({**log_odds, names: pair.log_odds}, names))
+            chosen += names
+            search.renew(pair.candidate.found)
+            current, strain_gain, strain_closes = _with_strain(search, pair.candidate.found.effects)
             break
         best = max(passing, key=lambda s: s.log_odds)
         for effect in effects:
@@ -196,24 +192,38 @@ def attribute(
             search, [s for s in scores.values() if of_one_phenomenon(s.effect, [best.effect])], best
         )
         chosen.append(best.name)
+        others = {n: x for n, x in log_odds.items() if not of_one_phenomenon(scores[n[0]].effect, best.added)}
+        choice = Choice({**others, (best.name,): best.log_odds}, (best.name,), certain=bool(known))
+        choices.append(_with_both(search, choice, scores, best))
         search.renew(best.candidate.found)
         current, strain_gain, strain_closes = _with_strain(search, best.candidate.found.effects)
-    known_p = [confidence_set_p(step) for step in steps[: max(len(chosen), 1)]]
-    picked = list(zip(steps, known_p, chosen, strict=False))
-    taken = tuple(name for *_, name in picked)
+    taken = tuple(chosen)[: len(steps)]
     current, chosen = _without_idle(search, chosen, current, seen)
     if any(n not in seen for n in chosen):
         current, chosen = drop_redundant(search, chosen, current, steps[0], seen)
-        picked += [(steps[0], known_p[0], n) for n in chosen if n not in taken]
     for effect in current.found.effects:
         current = _refined(search, effect, current)
-    asked = [n for n in chosen if n not in seen]
-    rivals = tuple(n for n in rivals_of(search, picked, asked) if n not in seen)
-    order = _strongest_first(search, current, chosen)
+    order = tuple(_strongest_first(search, current, chosen))
     return Attribution(
-        base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps),
-        taken, strain_gain, strain_closes, known_p[0],
+        base, ideal, deep, steps[0], order, current, posterior(choices, order), tuple(steps),
+        taken, strain_gain, strain_closes,
     )  # fmt: skip
+
+
+def _with_both(search: Search, choice: Choice, scores: dict[str, Score], best: Score) -> Choice:
+    """The choice, with the odds of the best effect once another is there that it leaves in doubt: each by
+    itself may be all, or the first of two."""
+    beside = {}
+    for names, probability in choice.probabilities().items():
+        if not names or names == choice.taken or probability <= search.options.doubt:
+            continue
+        other = scores[names[0]].candidate
+        there = search.reweighed(other.found)
+        alone = there.judge(other.found.effects, like=other)
+        both = there.judge([*other.found.effects, *best.added], like=other)
+        score = there.score(best.added, both, alone)
+        beside[names] = score.log_odds if there.able(score, first=False) else -np.inf
+    return dataclasses.replace(choice, beside=beside)
 
 
 def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:
@@ -259,15 +269,15 @@ def _able_together(
     return list({e.hints.phenomenon or e.name: e for e in reversed(able)}.values())
 
 
-def _paired(search: Search, able: Sequence[Effect], current: JudgedSet) -> JudgedSet | None:
+def _paired(search: Search, able: Sequence[Effect], current: JudgedSet) -> Score | None:
     """Two effects that close the gap only together."""
-    found = []
+    found: list[Score] = []
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)
         score = search.score([one, two], candidate, current)
         if search.passes(score):
-            found.append(candidate)
-    return min(found, key=lambda c: c.found.loss, default=None)
+            found.append(score)
+    return min(found, key=lambda s: s.candidate.found.loss, default=None)
 
 
 def _not_blind_to_slip(search: Search, passing: list[Score]) -> list[Score]:
@@ -285,18 +295,6 @@ def _refined(search: Search, effect: Effect, current: JudgedSet) -> JudgedSet:
         search.renew(current.found)
         current = search.judge(current.found.effects, like=current)
     return current
-
-
-def _reexamined(search: Search, score: Score, current: JudgedSet) -> Score:
-    """The score with size and plain gap as they are where nuisances are weighed at the new fit.
-
-    Where an effect changes the force much, first touches and stiffnesses of the old fit had made up for it.
-    """
-    there = search.reweighed(score.candidate.found)
-    old = there.judge(current.found.effects, like=current)
-    new = there.judge(score.candidate.found.effects, like=score.candidate)
-    again = there.score(score.added, new, old)
-    return dataclasses.replace(again, gain=score.gain, per_group=score.per_group)
 
 
 def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[JudgedSet, float, float]:

@@ -13,7 +13,6 @@ from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.descent import Descent, first_touches, fit
 from palpate.diagnosis.search.fit import Fit, settings_of
-from palpate.diagnosis.search.gaps import closed_share
 from palpate.diagnosis.search.leave_one_out import JudgedSet, held_out
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.whiten import Whitener
@@ -106,25 +105,24 @@ class Search:
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = fitted
             gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
-        # a lump under one place shows at that place alone: what it closes there counts, as its evidence does
+        foretold = np.where(predicted, old.held - new.held, 0.0).sum()
         if all(e.hints.few_places for e in added):
-            was, left = old.fitted_plain, new.fitted_plain
-        else:
-            was, left = old.plain, np.where(predicted, new.plain, old.plain)
+            # most places know nothing of a lump; where it is, its force must be the one that is missing
+            foretold = fitted.sum() if new.fitted_plain.sum() < old.fitted_plain.sum() else 0.0
         t = self.forward.touches
         before, after = old.residual[t.counted], new.residual[t.counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
-        noise = 3 * t.noise_n**2
-        least = self.smallest_n**2
-        samples = self.whitener.counts()
-        share = float(closed_share(was, left, samples, noise, least))
-        return Score(tuple(added), float(gain / over), size, share, per_group / over, new)
+        return Score(tuple(added), float(gain / over), size, float(foretold / over), per_group / over, new)
 
-    def passes(self, score: Score, *, first: bool = True) -> bool:
-        """Whether a score names its effect. first: nothing else is named yet."""
+    def able(self, score: Score, *, first: bool = True) -> bool:
+        """Whether a score's effect may be there at all. first: nothing else is named yet."""
         if score.effect.hints.by_first_touches and not first:
             return False
-        return score.share > 0 and score.probability > self.options.sure
+        return score.foretold > 0
+
+    def passes(self, score: Score, *, first: bool = True) -> bool:
+        """Whether a score names its effect."""
+        return self.able(score, first=first) and score.probability > self.options.sure
 
     def sideways_off(self, candidate: JudgedSet) -> float:
         """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.

@@ -2,8 +2,8 @@
 
 Residuals are drawn from the covariance of the comparison, an effect's own change of the force is added, and
 the rule of `naming` is asked, all by linear algebra about the fit without effects: what each candidate gains
-and closes at places left out follows from inner products. A first touch that the surface was fitted to takes
-along what shows by it.
+and foretells of places left out follows from inner products. A first touch that the surface was fitted to
+takes along what shows by it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.gaps import beside_modulus_n
 from palpate.diagnosis.search.leave_one_out import JudgedSet
-from palpate.diagnosis.search.naming import WEIGHTS
+from palpate.diagnosis.search.naming import WEIGHTS, beyond_untold
 from palpate.diagnosis.search.rivals import of_one_phenomenon
 from palpate.mechanics.effects.base import Effect
 
@@ -55,7 +55,7 @@ class Patterns:
     draws of what is left without effects.
 
     columns: (n, 3, 1 + c) N, the modulus first. own: (c,) number of the effect of each column. size: (c,) N
-    rms, a common factor taken off.
+    rms, a common factor taken off. beyond: (c,) log likelihood that a form has at most.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Patterns:
         counted = forward.touches.counted
         settings = settings_of(forward, found.effects, found.values, found.onset)
         before = np.nan_to_num(forward.predict(settings))
-        columns, own, size = [found.jacobian[:, :, 0]], [], []
+        columns, own, size, beyond = [found.jacobian[:, :, 0]], [], [], []
         for number, effect in enumerate(effects):
             for form in forms_of(search, effect):
                 settings = settings_of(forward, found.effects, found.values, found.onset)
@@ -83,12 +83,12 @@ class Patterns:
                     columns.append(_without_first_touches(search, change) if fitted else change)
                     own.append(number)
                     size.append(rms)
-        self.own, self.size = np.array(own, dtype=int), np.array(size)
+                    beyond.append(beyond_untold(effect, form))
+        self.own, self.size, self.beyond = np.array(own, dtype=int), np.array(size), np.array(beyond)
         self.columns = shown = np.stack(columns, axis=2)
         drawn = whitener.drawn(DRAWS, np.random.default_rng(seed))
         both = np.concatenate([shown, drawn], axis=2)
         self.white = Products.of(whitener.gram(both), shown.shape[2])
-        self.plain = Products.of(whitener.raw_gram(both), shown.shape[2])
         self.groups = whitener.groups
 
     def limit(self, number: int) -> float:
@@ -109,9 +109,9 @@ class Patterns:
     def named(self, number: int, true: np.ndarray, size_n: np.ndarray) -> np.ndarray:
         """(d,) whether each draw names the effect that stands in it by form true (d,), size_n (d,) N."""
         factor = size_n / self.size[true]
-        white, plain = self.white.with_column(1 + true, factor), self.plain.with_column(1 + true, factor)
+        white = self.white.with_column(1 + true, factor)
         gains = white.gains()
-        mine = self.scored(number, white, plain, gains)
+        mine = self.scored(number, white, gains)
         rest = np.array([gains[:, self.own == k].max(axis=1, initial=0.0) for k in range(len(self.effects))])
         near = (rest > CLOSE * rest[number]).any(axis=1)
         named = mine.passes.copy()
@@ -119,7 +119,7 @@ class Patterns:
         others = []
         for k in np.flatnonzero(near).tolist():
             if k != number and not of_one_phenomenon(self.effects[k], [self.effects[number]]):
-                other = self.scored(k, white, plain, gains)
+                other = self.scored(k, white, gains)
                 others.append(other)
                 best = np.where(other.passes, np.maximum(best, other.odds), best)
         doubt = self.search.options.beyond_doubt
@@ -128,7 +128,7 @@ class Patterns:
             named &= ~(other.passes & (other.odds > best - doubt) & (other.gain > most))
         return named
 
-    def scored(self, number: int, white: Products, plain: Products, gains: np.ndarray) -> Linear:
+    def scored(self, number: int, white: Products, gains: np.ndarray) -> Linear:
         """The score of an effect's likeliest form in each draw, as `Search.score` has it."""
         effect, options = self.effects[number], self.search.options
         forms = np.flatnonzero(self.own == number)
@@ -144,13 +144,10 @@ class Patterns:
             gain = each.sum(axis=1) - 0.5 * np.log(groups) * extra
         lump = effect.hints.few_places
         evidence = gain - (np.log(groups) if lump else np.maximum(per_group.max(axis=1), 0.0))
-        was = plain.left(None, old.amplitude, not lump)
-        left = plain.left(column, new.amplitude if lump else new.by_others, not lump)
-        if not lump:
-            left = np.where(predicted, left, was)
+        evidence = np.minimum(evidence, new.amplitude**2 * self.beyond[column - 1])
+        foretold = (each if lump else np.where(predicted, 0.5 * (old.held - new.held), 0.0)).sum(axis=1)
         odds = WEIGHTS.log_odds(evidence)
-        closes = (was - left).sum(axis=1) > 0
-        return Linear(closes & (expit(odds) > options.sure), odds, gain)
+        return Linear((foretold > 0) & (expit(odds) > options.sure), odds, gain)
 
 
 @dataclass(frozen=True)
@@ -164,13 +161,12 @@ class Linear:
 
 @dataclass(frozen=True)
 class Fitted:
-    """(d, g) each: twice the loss of a group, as fitted and held out; the column's amplitude by all groups
-    and by the others."""
+    """(d, g) each: twice the loss of a group, as fitted and held out. amplitude: (d,) of the column, by all
+    groups."""
 
     loss: np.ndarray
     held: np.ndarray
     amplitude: np.ndarray
-    by_others: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -210,16 +206,9 @@ class Products:
             amplitude = np.zeros_like(rm)
             if column is not None:
                 amplitude += (rd_ - md_ * rm_ / mm_) / np.maximum(dd_ - md_**2 / mm_, _LEAST * dd_)
-            found.append((amplitude, self._left((rm_ - amplitude * md_) / mm_, amplitude, column)))
-        (amplitude, loss), (by_others, held) = found
-        return Fitted(loss, held, amplitude, by_others)
-
-    def left(self, column: np.ndarray | None, amplitude: np.ndarray, others: bool) -> np.ndarray:
-        """(d, g) squares left by a column of these amplitudes (d, g), the modulus fitted to all groups or to
-        the others."""
-        md, mm = self._of(column)[0], self.columns[:, 0, 0]
-        mm_, rm_, md_ = (_summed(x, others) for x in (mm[None], self.mixed[:, :, 0], md))
-        return self._left((rm_ - amplitude * md_) / mm_, amplitude, column)
+            found.append((self._left((rm_ - amplitude * md_) / mm_, amplitude, column), amplitude[:, 0]))
+        (loss, by_all), (held, _) = found
+        return Fitted(loss, held, by_all)
 
     def _left(self, level: np.ndarray, amplitude: np.ndarray, column: np.ndarray | None) -> np.ndarray:
         mm, (md, dd, rd) = self.columns[:, 0, 0], self._of(column)

@@ -11,6 +11,7 @@ matters, never whether it is there. The weights were fitted once, to the recordi
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,14 +25,28 @@ from palpate.mechanics.effects.base import Effect
 
 @dataclass(frozen=True)
 class Weights:
-    """Log odds = offset + evidence * log10(gain in log likelihood)."""
+    """Log odds = offset + evidence * log10(gain in log likelihood). lapse: the share of the surest answers in
+    which something else was there."""
 
     offset: float
     evidence: float
+    lapse: float
 
     def log_odds(self, gain: ArrayLike) -> np.ndarray:
         """(...) that an effect is there. gain: log likelihood."""
         return np.asarray(self.offset + self.evidence * np.log10(np.maximum(gain, 1.0)))
+
+
+ALL_TOLD = 1e12
+
+
+def beyond_untold(effect: Effect, values: np.ndarray) -> float:
+    """Log likelihood that an effect of these values (k,) has at most, as they may be so where nothing is
+    wrong; a very large number where all is told."""
+    if not effect.hints.untold:
+        return ALL_TOLD
+    beyond = (values - effect.ideal) / effect.hints.untold
+    return 0.5 * float(beyond @ beyond)
 
 
 FILE = Path(__file__).with_name("naming.toml")
@@ -45,13 +60,14 @@ class Score:
 
     added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
     per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N.
-    share: of the old held-out excess over the noise that it closes (of a lump, of the fitted one).
+    foretold: log likelihood gained at places that the fit has not seen, all in all; of a lump as fitted, 0
+    where the plain squares do not shrink.
     """
 
     added: tuple[Effect, ...]
     gain: float
     size_n: float
-    share: float
+    foretold: float
     per_group: np.ndarray
     candidate: JudgedSet
 
@@ -68,10 +84,12 @@ class Score:
     @property
     def evidence(self) -> float:
         """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
-        is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which."""
+        is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which. No
+        more than what the values are beyond what they may be where nothing is wrong."""
         if self.effect.hints.few_places:
             return self.gain - float(np.log(len(self.per_group)))
-        return self.gain - max(float(self.per_group.max()), 0.0)
+        told = self.gain - max(float(self.per_group.max()), 0.0)
+        return min(told, beyond_untold(self.effect, self.candidate.found.of(self.effect.name)))
 
     @property
     def by_one_place(self) -> bool:
@@ -87,3 +105,16 @@ class Score:
     def probability(self) -> float:
         """The same as a probability."""
         return float(expit(self.log_odds))
+
+
+def beside_best(scores: Sequence[Score]) -> dict[tuple[str, ...], float]:
+    """Log odds, against nothing more, of effects of which one at most is there.
+
+    Of each by itself, and no more than its share of the greatest evidence has in the log odds of that: the
+    likelihood is tempered by so much as what the best one explains may be our own law's error, and no more.
+    """
+    if not scores:
+        return {}
+    best = max(scores, key=lambda s: s.evidence)
+    share = max(best.log_odds, 0.0) / max(best.evidence, 1.0)
+    return {(s.name,): min(s.log_odds, share * s.evidence) if share else s.log_odds for s in scores}

@@ -1,77 +1,109 @@
-"""Which effects the sites cannot tell apart: the model confidence set, rivals of a chosen one, look-alikes.
+"""How likely each set of causes is beside all others that were weighed; and which patterns look alike.
 
-Hansen, Lunde & Nason (2011), "The Model Confidence Set", Econometrica 79: explanations are dropped one after
-another while the hypothesis that all that are left predict equally well is rejected. The units are sites, as
-samples within a touch, and touches within a place, are not independent.
+A search goes step by step: something more is there, one of what was tried, or nothing more. The naming's log
+odds of each against nothing more are that step's posterior; along the steps they multiply.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import expit, softmax
 
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.leave_one_out import JudgedSet
-from palpate.diagnosis.search.naming import Score
 from palpate.mechanics.effects.base import Effect
 
 ALIKE = 0.92
 """Cosine of the angle between two effects' residual patterns from which they are called confusable."""
+Names = tuple[str, ...]
 
 
-def confidence_set_p(scores: dict[str, Score]) -> dict[str, float]:
-    """p value of each effect of a step, and of 'none', in the model confidence set over sites."""
-    names = [*scores, "none"]
-    losses = np.array([-s.per_group for s in scores.values()])
-    losses = np.vstack([losses, np.zeros(losses.shape[1])])
-    return dict(zip(names, confidence_p(losses, np.random.default_rng(0)), strict=True))
+@dataclass(frozen=True)
+class Explanation:
+    """A set of causes, and the probability that these, and no others, are there."""
+
+    effects: Names
+    probability: float
 
 
-def confidence_p(losses: np.ndarray, rng: np.random.Generator, draws: int = 1000) -> np.ndarray:
-    """(m,) p value of each explanation: it is in the set of confidence 1 - alpha where p > alpha.
+@dataclass(frozen=True)
+class Choice:
+    """One step: log odds, against nothing more, of what may be there beside what is chosen, and what was
+    taken (() where nothing was). certain: it is known from elsewhere. beside: log odds of what was taken once
+    another is there, by that other."""
 
-    losses: (m, g) loss of each of m explanations at each of g sites, smaller is better. Statistic: the
-    greatest t of an explanation's loss against the mean of those left (T_max), its distribution by bootstrap
-    of sites. The best explanation has p = 1.
+    log_odds: Mapping[Names, float]
+    taken: Names
+    certain: bool = False
+    beside: Mapping[Names, float] = field(default_factory=dict)
+
+    def probabilities(self) -> dict[Names, float]:
+        """Of each, and of nothing more."""
+        if self.certain:
+            return {self.taken: 1.0}
+        odds = {(): 0.0, **self.log_odds}
+        return dict(zip(odds, softmax(list(odds.values())).tolist(), strict=True))
+
+
+def posterior(choices: Sequence[Choice], found: Names) -> tuple[Explanation, ...]:
+    """Every set of causes that was weighed, the likeliest first.
+
+    found: the names that the last step's set was put back to. What stands beside a choice that was not taken,
+    but for what was, is not weighed: its set stands for all that hold it.
     """
-    m, g = losses.shape
-    p = np.ones(m)
-    left = list(range(m))
-    weight = rng.multinomial(g, np.full(g, 1 / g), size=draws) / g  # (draws, g), shared by all rounds
-    level = 0.0
-    while len(left) > 1:
-        excess = losses[left] - losses[left].mean(axis=0)
-        mean = excess.mean(axis=1)
-        drawn = weight @ excess.T - mean
-        error = np.sqrt((drawn**2).mean(axis=0)) + 1e-12
-        t = mean / error
-        level = max(level, float((np.max(drawn / error, axis=1) >= t.max()).mean()))
-        worst = int(np.argmax(t))
-        p[left.pop(worst)] = level
-    return p
+    sets: list[Explanation] = []
+    reached: Names = ()
+    left = 1.0
+    for choice in choices:
+        each = choice.probabilities()
+        for names, probability in each.items():
+            if names == choice.taken:
+                continue
+            both = float(expit(choice.beside.get(names, -np.inf)))
+            sets.append(Explanation((*reached, *names), left * probability * (1 - both)))
+            sets.append(Explanation((*reached, *choice.taken, *names), left * probability * both))
+        left *= each[choice.taken]
+        reached = (*reached, *choice.taken)
+        if not choice.taken:
+            break
+    return _gathered([Explanation(found, left), *sets])
 
 
-def rivals_of(
-    search: Search,
-    picked: list[tuple[dict[str, Score], dict[str, float], str]],
-    chosen: list[str],
-) -> tuple[str, ...]:
-    """Effects that would be named themselves and that the sites do not tell from the one picked in the same
-    step; the likeliest first. picked: a step's scores, their `confidence_set_p`, and what it took."""
-    found: dict[str, float] = {}
-    for scores, p, name in picked:
-        if name not in chosen:
-            continue
-        first = scores[name]
-        for score in scores.values():
-            if score.name in chosen or of_one_phenomenon(score.effect, first.added):
-                continue
-            if score.effect.hints.any_form and first.effect.scope.between_places and score.gain < first.gain:
-                continue
-            if p[score.name] > search.options.doubt and search.passes(score):
-                found.setdefault(score.name, first.log_odds - score.log_odds)
-    return tuple(sorted(found, key=lambda n: found[n]))
+def joint(one: Sequence[Explanation], two: Sequence[Explanation]) -> tuple[Explanation, ...]:
+    """Of two answers that do not depend on each other."""
+    return _gathered(
+        [Explanation((*a.effects, *b.effects), a.probability * b.probability) for a in one for b in two]
+    )
+
+
+def without(explanations: Sequence[Explanation], names: Collection[str]) -> tuple[Explanation, ...]:
+    """The same once these names are known not to be there."""
+    left = (Explanation(tuple(n for n in e.effects if n not in names), e.probability) for e in explanations)
+    return _gathered(list(left))
+
+
+def _gathered(sets: Sequence[Explanation]) -> tuple[Explanation, ...]:
+    """Each set once, in the order of the names that came first."""
+    found: dict[frozenset[str], Explanation] = {}
+    for e in sets:
+        key = frozenset(e.effects)
+        before = found.get(key, Explanation(e.effects, 0.0))
+        found[key] = Explanation(before.effects, before.probability + e.probability)
+    return tuple(sorted((e for e in found.values() if e.probability > 0), key=lambda e: -e.probability))
+
+
+def names_of(explanations: Sequence[Explanation]) -> Names:
+    """The names in any of them, those of the likeliest first."""
+    return tuple(dict.fromkeys(n for e in explanations for n in e.effects))
+
+
+def likeliest(explanations: Sequence[Explanation], share: float) -> tuple[Explanation, ...]:
+    """The smallest collection, the likeliest first, that holds a share of the posterior."""
+    total = np.cumsum([e.probability for e in explanations])
+    return tuple(explanations[: int(np.searchsorted(total, share - 1e-9)) + 1])
 
 
 def of_one_phenomenon(effect: Effect, others: Sequence[Effect]) -> bool:

@@ -12,6 +12,7 @@ from palpate.diagnosis import apply
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.instrument.free_air import FreeAir
 from palpate.diagnosis.search.attribution import Attribution
+from palpate.diagnosis.search.rivals import Explanation
 from palpate.diagnosis.verdict.where import Where
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.press_solver.solved_places import ExactPresses
@@ -40,10 +41,9 @@ def _plain(value: Any) -> Any:
 class EffectEntry:
     """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters.
 
-    intervals: [low, high] of each parameter at 95 %. confidence_set_p: p value of the model confidence set
-    (nan where it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
-    detectable_n: N rms of its force from which 19 of 20 draws of such presses name it (inf: at no size; nan:
-    unknown). size_n: N rms of what it changes, the best common factor taken off.
+    intervals: [low, high] of each parameter at 95 %. detectable_n: N rms of its force from which 19 of 20
+    draws of such presses name it (inf: at no size; nan: unknown). size_n: N rms of what it changes, the best
+    common factor taken off.
     """
 
     name: str
@@ -55,7 +55,6 @@ class EffectEntry:
     parameters: dict[str, Any]
     gain: float = 0.0
     intervals: dict[str, Any] = field(default_factory=dict)
-    confidence_set_p: float = float("nan")
     detectable_n: float = float("nan")
     size_n: float = float("nan")
 
@@ -80,7 +79,7 @@ class EffectEntry:
             "parameters_ci95": self.intervals,
             **{
                 name: value if np.isfinite(value := getattr(self, name)) else None
-                for name in ("odds", "confidence_set_p", "detectable_n", "size_n")
+                for name in ("odds", "detectable_n", "size_n")
             },
         }
 
@@ -119,9 +118,10 @@ class Diagnosis(Result):
 
     errors_n: our own errors, N rms: sensor, repeatability, shape, numerical. reasons: the verdict in words.
     held_out_n: gap (before, after), N, at the places of the deepest and of the fastest presses, fitted to the
-    rest. left_out: effects that were not tried, as such presses cannot show them or a quick diagnosis does
-    without. recording, model: what was diagnosed. `plot`: what each effect would take away. `show`: the
-    object coloured by the gap, with the next touch as an arrow.
+    rest. explanations: the smallest collection of sets of causes that holds nine tenths of the posterior, the
+    likeliest first. left_out: effects that were not tried, as such presses cannot show them or a quick
+    diagnosis does without. recording, model: what was diagnosed. `plot`: what each effect would take away.
+    `show`: the object coloured by the gap, with the next touch as an arrow.
     """
 
     noise_n: float
@@ -149,6 +149,7 @@ class Diagnosis(Result):
     held_out_n: dict[str, tuple[float, float]] = field(default_factory=dict)
     recording: Recording | None = None
     model: Model | None = None
+    explanations: tuple[Explanation, ...] = ()
     findings: Any = None  # diagnose.verdict.answer.Findings: all that the verdict rests on
 
     def improved(self) -> Model:
@@ -243,6 +244,9 @@ def answers_json(found: Any, next_touch: NextTouch | None) -> dict[str, Any]:
             "kind": found.kind,
             "effects": list(found.effects),
             "candidates": list(found.candidates),
+            "explanations": [
+                {"effects": list(e.effects), "probability": e.probability} for e in found.explanations
+            ],
         },
         "where": {
             "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in found.where.axes],

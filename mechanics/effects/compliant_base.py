@@ -55,7 +55,6 @@ EFFECT = Effect(
     apply=unchanged,
     hold=_hold,
     hints=SearchHints(
-        shape_rival=True,
         hides_strain=True,
         expensive=True,
     ),

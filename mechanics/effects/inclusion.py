@@ -217,7 +217,6 @@ EFFECT = Effect(
         seek=_seek,
         refine=_refine,
         few_places=True,
-        shape_rival=True,
         # a large soft ball and a small hard one look alike, and first order pulls the place towards the tip
         systematic=(3e-3, 3e-3, 3e-3, 4e-3, 0.7),
         signed=(4,),

@@ -53,7 +53,6 @@ EFFECT = Effect(
     change=_change,
     apply=_apply,
     hints=SearchHints(
-        shape_rival=True,
         expensive=True,
     ),
 )

@@ -159,7 +159,6 @@ EFFECT = Effect(
     apply=_apply,
     hints=SearchHints(
         seek=_seek,
-        shape_rival=True,
         any_form=True,
         expensive=True,
         # first order in the far field: on four slabs of 'palpate bench field' the contrast was 0.82 to 0.99

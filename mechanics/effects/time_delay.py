@@ -7,6 +7,7 @@ from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import LATE, ForwardSettings, TouchedScene
+from palpate.mechanics.law_errors import Latency
 from palpate.mechanics.recording.calibration import Calibration
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import delayed
@@ -34,5 +35,6 @@ EFFECT = Effect(
     read_as=LATE,
     hints=SearchHints(
         systematic=(2e-4,),
+        untold=(Latency.common.value,),
     ),
 )

@@ -51,7 +51,6 @@ EFFECT = Effect(
     hold=_hold,
     hints=SearchHints(
         candidates=_starts,
-        shape_rival=True,
         expensive=True,
     ),
 )

@@ -60,8 +60,8 @@ def test_what_inner_products_score_is_what_the_search_scores_of_the_same_residua
     old, new = own.judge([search.finite_strain]), own.judge([search.finite_strain, delay])
     score = own.score([delay], new, old)
     column, factor = np.ones(DRAWS, dtype=int), np.full(DRAWS, size_n / patterns.size[0])
-    white, plain = (p.with_column(column, factor) for p in (patterns.white, patterns.plain))
-    linear = patterns.scored(0, white, plain, white.gains())
+    white = patterns.white.with_column(column, factor)
+    linear = patterns.scored(0, white, white.gains())
     # noise is drawn as loud at each sample as it adds up to along a press, which the search sees as misfit
     assert linear.gain[0] == pytest.approx(score.gain * max(1.0, new.chi), rel=0.2)
 
@@ -78,8 +78,12 @@ def search_on_force(search: Search, force: np.ndarray) -> Search:
 
 
 def test_a_spring_in_the_tool_hides_behind_modulus_and_first_touch_as_a_delay_does_not(judged):
-    limits = detectable(*judged, [effect("time_delay"), effect("tip_radius"), effect("tool_compliance")])
+    """A delay by a clock that is known, for what hides; by one that is not, its limit is the clock's."""
+    delay = effect("time_delay")
+    known = dataclasses.replace(delay, hints=dataclasses.replace(delay.hints, untold=()))
+    limits = detectable(*judged, [known, effect("tip_radius"), effect("tool_compliance")])
     assert limits["time_delay"] < 0.7 * min(limits["tip_radius"], limits["tool_compliance"])
+    assert detectable(*judged, [delay])["time_delay"] > 1.2 * limits["time_delay"]
 
 
 def test_an_effect_that_starts_from_nothing_has_a_limit_as_well(judged):

@@ -9,15 +9,15 @@ from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.search.attribution import _with_strain, _without_idle
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.gaps import lower_closure
-from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.naming import Score, beside_best
 from palpate.mechanics.effects.registry import effect
 
 
-def score(name, per_group, share=0.7):
+def score(name, per_group, foretold=9.0, values=(0.02,)):
     gains = np.asarray(per_group, float)
     return Score(
-        (effect(name),), gain=gains.sum(), size_n=0.014, share=share, per_group=gains,
-        candidate=SimpleNamespace(chi=0.85),
+        (effect(name),), gain=gains.sum(), size_n=0.014, foretold=foretold, per_group=gains,
+        candidate=SimpleNamespace(chi=0.85, found=SimpleNamespace(of=lambda name: np.array(values))),
     )  # fmt: skip
 
 
@@ -40,10 +40,16 @@ def test_one_site_may_name_a_lump(search):
     assert search.passes(score("inclusion", alone))
 
 
-def test_what_is_there_is_named_however_little_it_closes_but_not_if_places_grow_worse(search):
+def test_what_is_there_is_named_unless_places_that_it_has_not_seen_grow_unlikelier(search):
     everywhere = [12.0, 8.0, 20.0, 16.0] * 10
-    assert search.passes(score("strain_stiffening", everywhere, share=0.01))
-    assert not search.passes(score("strain_stiffening", [1e3 * gain for gain in everywhere], share=-0.5))
+    assert search.passes(score("strain_stiffening", everywhere, foretold=0.1))
+    assert not search.passes(score("strain_stiffening", [1e3 * gain for gain in everywhere], foretold=-5.0))
+
+
+@pytest.mark.parametrize(("delay_s", "named"), [(5e-4, False), (-5e-4, False), (5e-3, True)])
+def test_a_clock_that_reads_half_a_sample_late_is_no_delay(search, delay_s, named):
+    """However surely many touches tell it: it may be so where nothing is wrong."""
+    assert search.passes(score("time_delay", [12.0, 8.0, 20.0, 16.0] * 10, values=(delay_s,))) == named
 
 
 def test_a_closed_gap_without_evidence_names_nothing(search):
@@ -53,6 +59,17 @@ def test_a_closed_gap_without_evidence_names_nothing(search):
 def test_probabilities_grow_with_evidence():
     few, many = score("time_delay", [0.5] * 40), score("time_delay", [20.0] * 40)
     assert 0 < few.probability < many.probability < 1
+
+
+def test_what_explains_half_of_what_the_best_does_is_no_rival_where_much_is_explained():
+    """Half of 40 nats may be the law's error in another form; half of 4,000 is not."""
+
+    def beside(gain):
+        scores = [score(n, [g / 40] * 40) for n, g in (("skin_layer", gain), ("tip_radius", 0.5 * gain))]
+        odds = beside_best(scores)
+        return odds[("skin_layer",)] - odds[("tip_radius",)]
+
+    assert 1.0 < beside(40.0) < 4.0 < 7.0 < beside(4000.0)
 
 
 def test_a_lump_that_one_place_alone_speaks_for_is_known_as_such():

@@ -180,4 +180,5 @@ def test_what_the_support_shows_is_named_before_what_presses_show(bench):
     tried = [effect("force_gain")]
     alone = attribute(search, tried)
     seen = attribute(search, tried, seen=frozenset({"force_gain"}))
-    assert alone.chosen == () and seen.chosen == ("force_gain",) and not seen.rivals
+    assert alone.chosen == () and seen.chosen == ("force_gain",)
+    assert [e.effects for e in seen.explanations] == [("force_gain",)]

@@ -66,7 +66,7 @@ def test_what_no_noise_tells_is_added(late):
     assert high - low == pytest.approx(expected, rel=0.2)
 
 
-def test_what_one_place_alone_speaks_for_closes_nothing(late):
+def test_what_one_place_alone_speaks_for_foretells_nothing(late):
     """The other places would not have added it, so they do not predict it: as a lump under one place."""
     search, plain, _ = late
     old = JudgedSet(
@@ -82,8 +82,8 @@ def test_what_one_place_alone_speaks_for_closes_nothing(late):
             [DELAY], JudgedSet(found, 0.5 * gram[:, 0, 0], lower, gram[:, 0, 0], search.dof, 1.0), old
         )
 
-    assert better_at([1]).share == better_at([1]).gain == 0.0
-    assert better_at([1, 3, 5]).share > 0.05
+    assert better_at([1]).foretold == better_at([1]).gain == 0.0
+    assert better_at([1, 3, 5]).foretold > 1.0
 
 
 class Twins:

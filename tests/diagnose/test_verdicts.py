@@ -88,7 +88,6 @@ def test_what_only_a_later_step_tried_has_its_numbers_too(delayed):
         findings.found,
         scores=first,
         steps=(first, later),
-        confidence_set_p={n: p for n, p in findings.found.confidence_set_p.items() if n in first},
     )
     findings = dataclasses.replace(findings, found=found)
     counts = findings.search.whitener.counts()

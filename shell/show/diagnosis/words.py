@@ -37,6 +37,8 @@ def meaning(name: str) -> str:
     return effect(name).plain_words or effect(name).words
 
 
+MOST_SETS = 4
+"""Of causes that words tell; the JSON holds all."""
 LITTLE = 0.1
 """A share of the difference below which it is not said to depend on something."""
 
@@ -50,6 +52,8 @@ def verdict(result: Diagnosis) -> str:
     """The answer in one sentence."""
     left_out, there = spoken(missing(result)), spoken([n for n in result.effects if n in in_model(result)])
     rivals = spoken(result.candidates, "or")
+    if result.kind == "none" and rivals:
+        return f"Measured and simulated force agree as far as these touches tell; {rivals} may be there."
     if result.kind == "none":
         return "Measured and simulated force agree: these touches show no missing effect."
     if result.kind == "unknown":
@@ -107,28 +111,35 @@ def answers(result: Diagnosis) -> list[tuple[str, str, str]]:
 
 def how_sure(result: Diagnosis) -> tuple[str, str, str]:
     question = "How sure is it?"
+    likely = result.explanations[:MOST_SETS]
+    left = "; ".join(f"{percent(e.probability)} {_set(e.effects)}" for e in likely)
     if result.kind == "none":
         smaller = "Smaller ones may be there; deeper, faster or longer touches would show them."
-        return question, "Larger effects would have been named", f"{begun(limits(result))}. {smaller}"
+        weighed = f"These touches leave open: {left}. " if result.candidates else ""
+        text = f"{weighed}{begun(limits(result))}. {smaller}"
+        return question, "Larger effects would have been named", text
     if result.candidates:
         also = "; ".join(f"{spaced(n)}: {meaning(n)}" for n in result.candidates)
-        text = f"Not ruled out: {also}. The touch proposed below would decide it."
+        text = f"Not ruled out: {also}. By these touches: {left}. The touch proposed below would decide it."
         return question, "These touches cannot decide", text
     if not result.effects:
         return question, "The gap is there, its cause is open", (
             "None of the effects that were tried takes it away at held-out places."
         )  # fmt: skip
     sure = {e.name: e.probability for e in result.entries if e.name in result.effects}
-    least = min(sure, key=lambda name: sure[name])
     text = (
-        f"Of 100 such answers on simulated recordings whose truth is known, {100 * sure[least]:.0f} "
-        f"{'or more ' if len(sure) > 1 else ''}were right. Every other "
-        "effect that was tried explains less at held-out places."
+        "All other sets of effects that were tried, and that nothing is missing, are less likely than one "
+        "in ten together. How evidence counts was learnt from simulated recordings whose truth is known."
     )
     if len(sure) == 1:
-        return question, f"{percent(sure[least])} sure", text
+        return question, f"{percent(*sure.values())} sure", text
     each = ", ".join(f"{spaced(name)} {percent(share)}" for name, share in sure.items())
     return question, begun(each), text
+
+
+def _set(names: Sequence[str]) -> str:
+    """A set of causes in words."""
+    return " and ".join(map(spaced, names)) or "nothing that is missing"
 
 
 def limits(result: Diagnosis) -> str:
