@@ -26,6 +26,8 @@ from palpate.operations._shared import (
     TipAngle,
     TipForm,
     columns_option,
+    moduli,
+    modulus_option,
     named,
     offset_option,
     report_option,
@@ -84,9 +86,7 @@ def open(
     layer_m: Annotated[
         float | None, option("thickness of a machine's sample; None: a half-space", unit="m", advanced=True)
     ] = None,
-    young_modulus_pa: Annotated[
-        float | None, option("Young's modulus, for a surface file", unit="Pa", flag="--modulus")
-    ] = None,
+    young_modulus_pa: Annotated[float | Mapping[str, float] | None, modulus_option()] = None,
     fast: Annotated[bool, option("try fewer effects", advanced=True)] = False,
     seed: Seed = 0,
     how: Given[ReconstructOptions],
@@ -124,7 +124,7 @@ def open(
         case "model":
             result = _model(files)
         case "mesh":
-            result = _mesh(files, save, tip_radius_m, young_modulus_pa, how, call.wanted)
+            result = _mesh(files, save, tip_radius_m, moduli(young_modulus_pa), how, call.wanted)
         case "curves":
             of_machine = {"travel": travel, "compression": compression, "layer_m": layer_m, "fast": fast}
             result = _curves(files, seed=seed, progress=call.wanted, **of_file, **of_machine, **of_tip, **how)
@@ -150,7 +150,7 @@ def _mesh(
     files: tuple[Any, ...],
     save: str | Path | None,
     tip_radius_m: float | None,
-    modulus_pa: float | None,
+    modulus_pa: Any,
     how: Mapping[str, Any],
     progress: bool | Progress,
 ) -> Opened:
