@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from palpate.mechanics.contact.tip import other_tip
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import flag_of
 from palpate.operations._call import Call
@@ -117,7 +118,7 @@ def open(
     _refuse_idle(kind, files[0], how)
     of_tip = {"tip": tip, "tip_angle_deg": tip_angle_deg}
     if kind != "curves":
-        _sphere_alone(of_tip)
+        _sphere_alone(tip, tip_angle_deg, files[0])
     opened = {"files": files, "save": save, **of_log, **how}
     made = partial(_reconstructed, files, opened, how, save=save, seed=seed, progress=call.wanted)
     match kind:
@@ -251,15 +252,11 @@ def _reconstructed(
     )
 
 
-def _sphere_alone(of_tip: Mapping[str, Any]) -> None:
+def _sphere_alone(tip: str | None, angle_deg: float | None, file: Any) -> None:
     """Raise OptionError for a tip that recordings, surfaces and models know nothing of."""
-    for name, value in of_tip.items():
-        if value not in (None, "sphere"):
-            flag = "--" + name.removesuffix("_deg").replace("_", "-")
-            raise OptionError(
-                f"{flag} is {value}, and an object is pressed by a sphere alone: leave {flag} out (a "
-                "machine's curves take other tips)"
-            )
+    form = tip or ("sphere" if angle_deg is None else "cone")
+    if form != "sphere":
+        raise OptionError(other_tip(form, "--tip", str(file)))
 
 
 def _only(files: tuple[Any, ...]) -> Any:
