@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from palpate.diagnosis.specimen.approach import SURE_PULL
 from palpate.diagnosis.specimen.bench import MachineCycle, touched
 from palpate.diagnosis.specimen.elastic_fit import Elastic, elastic_fit
 from palpate.mechanics.contact.tip import Tip
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO
+from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
 _AWAY, _BACK = 0.15, 0.5
 """Shares of the depth before first touch, and after it is lost, in which the tip may pull or push already."""
@@ -51,7 +53,11 @@ def without_slope(
     groups = [list(range(len(used)))] if alike else [[k] for k in range(len(used))]
     slopes = np.zeros(len(used))
     for group in groups:
-        fit = elastic_fit([used[k] for k in group], found.onset[group], tip, poisson_ratio)
+        own = [used[k] for k in group]
+        pull = float(
+            np.median([_pull(curve, float(found.onset[k])) for k, curve in zip(group, own, strict=True)])
+        )
+        fit = elastic_fit(own, found.onset[group], tip, poisson_ratio, pull_n=pull)
         if fit.sloped > _LIKELY:
             slopes[group] = fit.slope_n_per_m
     free = iter(
@@ -63,6 +69,15 @@ def without_slope(
         slopes[slopes != 0],
         fit if alike else None,
     )
+
+
+def _pull(curve: MachineCycle, onset: float) -> float:
+    """N, greatest pull on the way out below the air of the way in, 0 where noise alone reaches so far."""
+    peak = int(np.argmax(curve.force))
+    air = curve.force[:peak][curve.travel[:peak] < onset]
+    level = float(np.median(air)) if len(air) else float(curve.force[0])
+    pull = level - float(curve.force[peak:].min())
+    return pull if pull > SURE_PULL * white_noise_std(curve.force[:, None]) else 0.0
 
 
 def _free(curve: MachineCycle, onset: float, slope: float, timed: bool) -> MachineCycle:
