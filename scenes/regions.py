@@ -45,7 +45,8 @@ def moduli_of(
         one = "" if stated else ", or --modulus PA, one for all"
         raise OptionError(f"'{name}' holds {words_of(parts)}, of what modulus is each: say {flags}{one}")
     order = sorted(parts, key=lambda part: -part.volume_m3)
-    return _limited({part.name: float(stated.get(part.name, rest)) for part in order})
+    others = 0.0 if rest is None else float(rest)
+    return _limited({part.name: float(stated.get(part.name, others)) for part in order})
 
 
 def _limited(moduli: dict[str, float]) -> dict[str, float]:

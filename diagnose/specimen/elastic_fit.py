@@ -367,9 +367,10 @@ def _weighed(tried: Sequence[_Tried], every: np.ndarray, curves: int) -> Elastic
             )
     yields = share > 0
     chance, nan = float(weight[yields].sum()), float("nan")
-    taken, yielding = (nan, nan, nan), nan
+    taken: list[float] = [nan, nan, nan]
+    yielding = nan
     if chance > 0:
-        taken = tuple(_quantiles(share[yields], 0 * share[yields], weight[yields]))
+        taken = _quantiles(share[yields], 0 * share[yields], weight[yields])
         yielding = float(np.exp(_quantiles(log_e[yields], error[yields], weight[yields])[1]))
     law = max(laws, key=lambda name: laws[name])
     mine = min((each for each in tried if each.fits[0].law.name == law), key=per_reading)
