@@ -10,8 +10,9 @@ import hashlib
 import json
 import shutil
 import warnings
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +31,11 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.recording.files import recording_files
 from palpate.mechanics.recording.recording import read_recording
 from palpate.mechanics.shape.flat_foot import Standing, direction, standing
+from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.scenes.embedded import embedded_names, embedded_recording
 from palpate.scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
+from palpate.scenes.regions import moduli_of, ratio_of
 from palpate.scenes.scene import Scene, ball_of
 from palpate.scenes.shipped import DamagedError, part_of, shipped_model, unpack
 from palpate.scenes.virtual_presses import palpate_model
@@ -189,29 +192,39 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
     """The model of a surface's file, or of a mesh with `vertices` and `faces` in the scene's unit, in its
     own frame.
 
-    Raises SurfaceError where it is open or has no flat foot.
+    Raises SurfaceError where it is open or has no flat foot, OptionError where it has parts and the scene
+    says no modulus of each.
     """
     from palpate.reconstruction.geometry.filled import solid_of
 
     surface = solid_of(shape, scene.unit, direction(scene.up))
-    return _built(
-        scene,
-        standing(surface, scene.up, scene.sink_m),
-        ObjectMaterial(DEFAULT_MODULUS_PA, USUAL_POISSON_RATIO, inclusions=_balls(scene.inclusions or ())),
-        {
-            "method": "scene",
-            "mesh": surface.name,
-            "mended": ", ".join(surface.notes),
-            "parts": words_of(surface.parts),
-        },
-        progress,
-    )
+    moduli: dict[str, float] = {}
+    if surface.parts or isinstance(scene.young_modulus_pa, Mapping):
+        moduli = moduli_of(surface.parts, scene.young_modulus_pa, surface.name)
+    if moduli:
+        scene = replace(scene, young_modulus_pa=next(iter(moduli.values())))
+    own = ObjectMaterial(DEFAULT_MODULUS_PA, USUAL_POISSON_RATIO, inclusions=_balls(scene.inclusions or ()))
+    about = {
+        "method": "scene",
+        "mesh": surface.name,
+        "mended": ", ".join(surface.notes),
+        "parts": words_of(surface.parts, moduli),
+        "modulus_of": next(iter(moduli), ""),
+    }
+    field = partial(ratio_of, parts=surface.parts, moduli=moduli) if moduli else None
+    return _built(scene, standing(surface, scene.up, scene.sink_m), own, about, progress, field)
 
 
 def _built(
-    scene: Scene, stood: Standing, own: ObjectMaterial, provenance: dict[str, str], progress: Progress
+    scene: Scene,
+    stood: Standing,
+    own: ObjectMaterial,
+    provenance: dict[str, Any],
+    progress: Progress,
+    field: Callable[[TetMesh], np.ndarray] | None = None,
 ) -> Model:
-    """The model of a shape that stands in its own frame; own: its material where the scene says nothing."""
+    """The model of a shape that stands in its own frame; own: its material where the scene says nothing;
+    field: (m,) modulus of a mesh's tetrahedra over the global one."""
     # here, and below: a model that is kept or shipped is opened without loading what makes one
     from palpate.reconstruction.shapes.drawing import decimated
     from palpate.reconstruction.steps.s4_surface import Surface
@@ -253,14 +266,16 @@ def _built(
             CoarserMesh,
             stacklevel=3,
         )
+    mesh = meshing.mesh.quadratic()
     material = replace(
         own,
+        field=field(mesh) if field else None,
         young_modulus_pa=scene.young_modulus_pa or own.young_modulus_pa,
         poisson_ratio=own.poisson_ratio if scene.poisson_ratio is None else scene.poisson_ratio,
         dent_law="neo-hookean" if scene.finite_strain else "linear",
     )
     model = Model(
-        mesh=meshing.mesh.quadratic(),
+        mesh=mesh,
         material=material,
         support=Support(surface.support_point, surface.support_normal),
         tool=Tool(scene.tip_radius_m or USUAL_TIP_RADIUS_M),

@@ -8,6 +8,8 @@ A TOML file whose keys carry their units. Allowed tables and keys:
     mesh (a
                  surface or mesh file in its own frame; unit, up, sink_m), model (a MODEL folder) or
                  recording; young_modulus_pa, poisson_ratio, mesh_size_m, finite_strain
+    [[part]]     name, young_modulus_pa: of a body or label of the mesh; [object] young_modulus_pa is of the
+                 others
     [[inclusion]] name, centre_m, radius_m, modulus_ratio       (object frame: base's centre, z up; the file's
                  frame for a mesh)
     [tool]       tip_radius_m
@@ -34,6 +36,7 @@ from palpate.mechanics.names import unknown
 from palpate.mechanics.plausible import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from palpate.scenes.embedded import embedded_names, embedded_recording
 from palpate.scenes.phantoms import PHANTOMS, Region
+from palpate.scenes.regions import REST
 
 FOLDER = Path(__file__).parent
 COLOURS = ("displacement", "stiffness")
@@ -56,6 +59,7 @@ SCHEMA: Schema = {
         "up": FileKey(str),
         "sink_m": FileKey(low=0.0, high=0.1, unit="m"),
     },
+    "part": Listed({"name": FileKey(str, required=True), "young_modulus_pa": YOUNG_MODULUS}),
     "inclusion": Listed({**BALL, "name": FileKey(str)}),
     "tool": {"tip_radius_m": _OPTIONAL_TIP},
     "device": {
@@ -79,8 +83,9 @@ SCHEMA: Schema = {
 class Scene:
     """kind, source: the object, one of OBJECT_KINDS and its name or path. Lengths m, moduli Pa.
 
-    young_modulus_pa, poisson_ratio: None keeps the object's own. inclusions: None keeps the phantom's own.
-    beside: a second renderer that the same tip drives, '' for none. friction: Coulomb coefficient, None
+    young_modulus_pa, poisson_ratio: None keeps the object's own; of a mesh of several parts the modulus is
+    one number for all, or one by the part's name, '' for the others. inclusions: None keeps the phantom's
+    own. beside: a second renderer that the same tip drives, '' for none. friction: Coulomb coefficient, None
     sticks. unit, up, sink_m: how a mesh's file is meant (mechanics.shape.flat_foot). mesh_size_m: None takes
     10 mm, less for a small object. find: the inclusions are hidden, to be found.
     """
@@ -90,7 +95,7 @@ class Scene:
     source: str
     title: str = ""
     about: str = ""
-    young_modulus_pa: float | None = None
+    young_modulus_pa: float | Mapping[str, float] | None = None
     poisson_ratio: float | None = None
     mesh_size_m: float | None = None
     finite_strain: bool = True
@@ -105,6 +110,13 @@ class Scene:
     up: str = "+z"
     sink_m: float = 0.0
     find: bool = False
+
+    def __post_init__(self) -> None:
+        if isinstance(self.young_modulus_pa, Mapping) and self.kind != "mesh":
+            raise OptionError(
+                f"a modulus by name is of the parts of a mesh's file, and '{self.source}' is a {self.kind}: "
+                "make its model anew with palpate model FILE --modulus NAME=PA"
+            )
 
 
 def scene_names() -> list[str]:
@@ -185,7 +197,7 @@ def _scene(table: Mapping[str, Any], path: Path) -> Scene:
             source=_source(kind, str(thing[kind]), path),
             title=str(table.get("title", path.stem)),
             about=str(table.get("about", "")),
-            young_modulus_pa=thing.get("young_modulus_pa"),
+            young_modulus_pa=_modulus(table),
             poisson_ratio=thing.get("poisson_ratio"),
             mesh_size_m=thing.get("mesh_size_m"),
             unit=str(thing.get("unit", "m")),
@@ -203,6 +215,15 @@ def _scene(table: Mapping[str, Any], path: Path) -> Scene:
         )
     except OptionError as error:
         raise SceneError(f"'{path}': {error}") from error
+
+
+def _modulus(table: Mapping[str, Any]) -> float | dict[str, float] | None:
+    """Of the object, or of each part of a mesh."""
+    whole, parts = table["object"].get("young_modulus_pa"), table.get("part", [])
+    if not parts:
+        return whole
+    named = {each["name"]: float(each["young_modulus_pa"]) for each in parts}
+    return named if whole is None else {**named, REST: float(whole)}
 
 
 def _source(kind: str, value: str, path: Path) -> str:

@@ -16,6 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.devices.intention import HandPath
+from palpate.mechanics.compliance.near_field import surface_softness
+from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.errors import SceneError
@@ -58,6 +60,10 @@ def palpate_model(
         patch=LoadPatch(tip_radius_m=model.tool.tip_radius_m),
         progress=progress,
     )
+    # over the modulus of what the tip meets, of which the dent is, as the renderer has it
+    soft = surface_softness(model.mesh, model.surface_ratio, touched.points, model.tool.tip_radius_m)
+    within = (1 - soft)[:, None, None] * half_space_compliance(touched.normals, nu, touched.patch_width_m)
+    touched = replace(touched, far=(touched.far + within) / soft[:, None, None])
     samples = max(8, round(depth_m / SPEED_M_PER_S * RATE_HZ))
     ramp = np.arange(1, samples) * (depth_m / samples)
     depth = np.concatenate([ramp, ramp[::-1]])
@@ -71,6 +77,7 @@ def palpate_model(
         tip_radius_m=model.tool.tip_radius_m,
         law=model.material.dent_law,
     )
+    forces /= np.repeat(soft, len(depth))[:, None]
     centres = touched.points + model.tool.tip_radius_m * touched.normals
     presses = of_paths(
         starts,
@@ -82,7 +89,7 @@ def palpate_model(
         sample_rate_hz=RATE_HZ,
     )
     presses = replace(presses, depth_m=np.full(len(chosen), depth_m))
-    fitted = columns(fit_robust(presses), np.full(len(chosen), model.material.young_modulus_pa))
+    fitted = columns(fit_robust(presses), model.material.young_modulus_pa / soft)
     return model.replaced(presses=presses.with_fits(**fitted))
 
 

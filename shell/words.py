@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from palpate.mechanics.model.model import Model
 
 
 def spaced(name: str) -> str:
@@ -157,3 +160,9 @@ def share_words(value: float | None) -> str:
     if value is None:
         return "-"
     return percent(value) if value >= 0 else "none (worse)"
+
+
+def part_words(model: Model) -> str:
+    """' of liver' where its global modulus is that of one part of a mesh's file, else ''."""
+    part = model.provenance.get("modulus_of")
+    return f" of {part}" if part else ""

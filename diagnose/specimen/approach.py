@@ -14,7 +14,7 @@ from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 _BLOCKS = 8
 _SHIFTS = np.linspace(-0.1, 0.1, 401)
 """Of first touch, in shares of the depth: finer than what tells one law from another."""
-_PULLS = 5.0
+SURE_PULL = 5.0
 """Standard deviations of the noise that a pull must exceed: no noise reaches so far in some thousand rows."""
 
 
@@ -62,7 +62,7 @@ def approach_of(bench: Bench) -> Approach:
         gone = 1 + trapezoid(push[back], u[back]) / given
         work.append(gone if u[part.stop - part.start - 1] < 0.5 * u.max() else np.nan)
         pulls = -float(push[top:].min())
-        sure = pulls > _PULLS * white_noise_std(push[:, None])
+        sure = pulls > SURE_PULL * white_noise_std(push[:, None])
         pull.append((pulls if sure else 0.0) / bench.similarity.force)
     medians = {name: float(np.median(values)) for name, values in errors.items()}
     law = min(tip.laws, key=lambda name: medians[name])

@@ -8,41 +8,25 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.specimen.approach import Approach
 from palpate.diagnosis.specimen.bench import Bench
-from palpate.diagnosis.specimen.machine_compliance import (
-    Machine,
-    Way,
-    machine_of,
-    own_moduli,
-    rigid_interval,
-    way_of,
-)
-from palpate.diagnosis.specimen.pulled import jkr_modulus
+from palpate.diagnosis.specimen.elastic_fit import JKR, NAMED, Elastic
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL
 
 Seen = tuple[np.ndarray, np.ndarray, np.ndarray, str, str]
 """Depth m, force N measured, force N of the fit, and the axes' words."""
-_DRAWN = 300
 
 
-def seen_of_few(bench: Bench, approach: Approach, machine: Machine | None) -> Seen:
-    """The first curve, in the machine's size, and the law's over it."""
+def seen_of_few(bench: Bench, elastic: Elastic) -> Seen:
+    """The first curve, in the machine's size, and the likeliest hypothesis over it."""
     part, like = bench.model.presses.parts[0], bench.similarity
     depth, push = bench.model.presses.depth[part] / like.length, bench.model.presses.push[part] / like.force
-    law = approach.law if machine is None else machine.law
-    modulus = float(approach.modulus_pa[0]) if machine is None else machine.modulus_pa
-    shift = approach.first / like.length if machine is None else 0.0
-    dent = np.linspace(0.0, max(float(depth.max()) - shift, 1e-12), _DRAWN)
-    nu, tip = bench.model.material.poisson_ratio, bench.tip.scaled(1 / like.length)
-    force = tip.force(law, dent, modulus, nu)
-    gives = 0.0 if machine is None else force / machine.stiffness_n_per_m
-    return depth, push, np.interp(depth, dent + gives + shift, force), "depth [m]", "force [N]"
+    force = np.interp(depth - elastic.touch_m, elastic.along_m, elastic.along_n)
+    return depth, push, np.where(depth > elastic.touch_m, force, 0.0), "depth [m]", "force [N]"
 
 
 def seen_of_all(bench: Bench, made: Diagnosis) -> Seen:
@@ -72,16 +56,6 @@ _STRAIGHT = (
 )
 MACHINE_TAKES_ALL = "the machine's stiffness, which takes nearly all of the travel,"
 """What a modulus that is the machine's is said to rest on."""
-_ALIKE = 1.1
-"""The interval of a few curves covers laws that miss at most so many times what the best misses."""
-
-
-def _both(modulus_pa: float, own: np.ndarray, interval: tuple[float, float]) -> tuple[float, float]:
-    """Pa, 95 %: by what curves differ in ln E, own (c,) Pa, beside the fit's own interval."""
-    between = 0.0
-    if len(own) > 1:
-        between = student.ppf(0.975, len(own) - 1) * np.log(own).std(ddof=1) / np.sqrt(len(own))
-    return as_read(modulus_pa, interval, between)
 
 
 def as_read(modulus_pa: float, interval: tuple[float, float], log_half: float = 0.0) -> tuple[float, float]:
@@ -93,20 +67,15 @@ def as_read(modulus_pa: float, interval: tuple[float, float], log_half: float = 
     return modulus_pa * float(np.exp(-low)), modulus_pa * float(np.exp(high))
 
 
-def _ways(tests: MachineTests, bench: Bench) -> list[Way]:
-    """The ways in, in the machine's size."""
-    return [
-        way_of(curve.travel, curve.force, float(at))
-        for curve, at, used in zip(tests.curves, bench.onset_m, bench.used, strict=True)
-        if used
-    ]
-
-
 def material_of_few(
-    tests: MachineTests, bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[str]
+    tests: MachineTests,
+    bench: Bench,
+    approach: Approach,
+    elastic: Elastic,
+    names: tuple[str, ...],
+    notes: list[str],
 ) -> Material:
-    """Fewer curves than can be held out: the laws of the dent, the machine beside them."""
-    own = approach.modulus_pa
+    """Fewer curves than can be held out: laws of the dent, machine and free air, each by its likelihood."""
     gone = "it ends in its hold"
     if np.isfinite(approach.hysteresis):
         gone = f"{round(100 * approach.hysteresis)} % of the work does not come back"
@@ -115,63 +84,65 @@ def material_of_few(
         gone += f", and it pulls by up to {_force(pull)} on the way out"
     tip = tests.tip
     assert tip is not None
-    ways = _ways(tests, bench)
-    machine: Machine | None = None
-    nu = bench.model.material.poisson_ratio
     if tip.form == "punch":
         notes.append(_STRAIGHT)
-    elif len(ways) > 1 or np.isfinite(approach.hysteresis):
-        machine = machine_of(ways, nu, tip, float(np.median(own)))
     lost = approach.hysteresis if approach.hysteresis > _WIDE else 0.0
     if lost:
         notes.append(_LOOP)
-    limit = _ALIKE * approach.error[approach.law]
-    likely = [approach.law, *(n for n in tip.laws if n != approach.law and approach.error[n] <= limit)]
-    interval = _both(float(own.mean()), own, rigid_interval(ways, nu, tip, float(own.mean()), likely))
-    if pull > 0 and tip.radius_m is not None and tip.form == "sphere":
-        sticky = jkr_modulus(ways, tip.radius_m, nu, pull, float(own.mean()))
-        ends = as_read(sticky, (sticky, sticky))
-        interval = min(interval[0], ends[0]), max(interval[1], ends[1])
-        notes.append(
-            f"with that pull by JKR the modulus would be {sticky:.4g} Pa: the interval reaches there"
-        )
-    onset = {"onset_m": bench.onset_m[bench.used].tolist()}
-    common = Material(
+    modulus = elastic.modulus_pa
+    made = Material(
         kind="indentation",
         files=names,
-        curves=len(own),
+        curves=int(bench.used.sum()),
         held_out="blocks of each way in",
-        young_modulus_pa=float(own.mean()),
-        young_modulus_ci95_pa=_with_loop(lost, interval),
-        law=approach.law,
-        error=approach.error,
-        verdict=f"{approach.law} follows the way in best; {gone}",
-        parameters=onset,
-        notes=(*notes, _NO_SPHERE if tip.form != "sphere" else _FEW if tests.timed else _NO_TIME),
+        young_modulus_pa=modulus,
+        young_modulus_ci95_pa=_with_loop(lost, as_read(modulus, elastic.interval_pa)),
+        law=elastic.law,
+        error={**approach.error, elastic.law: elastic.missed},
+        verdict=f"{elastic.law} follows the way in best; {gone}",
+        parameters={"onset_m": bench.onset_m[bench.used].tolist()},
+        notes=(*notes, *elastic_notes(elastic)),
         unknown=(*INDENTATION_UNKNOWN, "which effect"),
         odds=tests.odds,
-        seen=seen_of_few(bench, approach, None),
+        seen=seen_of_few(bench, elastic),
     )
-    if machine is None:
-        return common
-    low, high = machine.stiffness_ci95_n_per_m
+    made = with_machine(made, elastic)
+    more = _NO_SPHERE if tip.form != "sphere" else _FEW if tests.timed else _NO_TIME
+    return replace(made, notes=(*made.notes, more))
+
+
+def elastic_notes(elastic: Elastic) -> tuple[str, ...]:
+    """What else the ways in may be, and where the modulus would be then."""
+    notes = []
+    sticky = elastic.laws.get(JKR, 0.0)
+    if sticky > 1 - NAMED:
+        share = f"{100 * sticky:.3g} %"
+        notes.append(f"the sample pulls at the tip as by JKR (probability {share}), which the modulus counts")
+    if 1 - NAMED < elastic.yields <= NAMED:
+        notes.append(
+            f"a machine that yields by {elastic.stiffness_n_per_m / 1e3:.3g} N/mm may be in it (probability "
+            f"{100 * elastic.yields:.2g} %): the modulus would be {elastic.yielding_pa:.4g} Pa, and the "
+            "interval reaches there; press something rigid to know it"
+        )
+    return tuple(notes)
+
+
+def with_machine(made: Material, elastic: Elastic) -> Material:
+    """With the machine that yields, where it is named."""
+    if not elastic.machine:
+        return made
+    low, high = elastic.stiffness_ci95_n_per_m
+    yields = f"the machine yields by {elastic.stiffness_n_per_m / 1e3:.3g} N/mm ({low / 1e3:.3g} to "
+    other = made.verdict.removeprefix(f"{made.law} follows the way in best; ")
     return replace(
-        common,
-        young_modulus_pa=machine.modulus_pa,
-        young_modulus_ci95_pa=_with_loop(
-            lost,
-            _both(machine.modulus_pa, own_moduli(ways, nu, tip, machine), machine.modulus_ci95_pa),
-        ),
-        seen=seen_of_few(bench, approach, machine),
-        law=machine.law,
-        error={**approach.error, "on a rigid machine": machine.rigid_error, "verdict": machine.error},
-        verdict=f"the machine yields by {machine.stiffness_n_per_m / 1e3:.3g} N/mm "
-        f"({low / 1e3:.3g} to {high / 1e3:.3g}); {gone}",
-        effects=(TOOL.name,),
-        at_bound=(MACHINE_TAKES_ALL,) if machine.takes_all else (),
-        bound_carries=machine.takes_all,
-        parameters={**onset, TOOL.name: {"stiffness_n_per_m": machine.stiffness_n_per_m}},
-        notes=(*common.notes, f"on a rigid machine the modulus would be {machine.rigid_modulus_pa:.4g} Pa"),
+        made,
+        error={**made.error, "on a rigid machine": elastic.rigid_missed, "verdict": elastic.missed},
+        verdict=f"{yields}{high / 1e3:.3g}); {other}",
+        effects=(TOOL.name, *made.effects),
+        at_bound=(*made.at_bound, *((MACHINE_TAKES_ALL,) if elastic.takes_all else ())),
+        bound_carries=made.bound_carries or elastic.takes_all,
+        parameters={**made.parameters, TOOL.name: {"stiffness_n_per_m": elastic.stiffness_n_per_m}},
+        notes=(*made.notes, f"on a rigid machine the modulus would be {elastic.rigid_pa:.4g} Pa"),
     )
 
 

@@ -1,9 +1,8 @@
-"""What a few curves tell of the machine beside the material: how far it yields.
+"""How well each law of the dent, on a machine that is rigid or yields, predicts force that was left out.
 
 A machine of stiffness K adds F / K to the travel, u = u0 + d(F / E) + F / K, where d is the depth at which
 the law gives F. For each E the rest is linear, so one search over E fits all curves at once, each with
-a first touch u0 of its own (which may be late). A machine is named only where every law on a rigid one misses
-the blocks of force that were left out by more.
+a first touch u0 of its own (which may be late). What modulus and machine are is told by `elastic_fit`.
 """
 
 from __future__ import annotations
@@ -16,20 +15,10 @@ from scipy.optimize import minimize_scalar, nnls
 
 from palpate.mechanics.contact.tip import Tip
 
-_BETTER, _ALIKE = 0.93, 1.1
-"""Another law than the tip's first must miss at most the first share of what that misses; the intervals cover
-laws that miss at most the second share of the least."""
 _POINTS, BLOCKS = 60, 6
 _LOWEST = 0.03
 """Share of the peak below which noise and pull decide where the contact is."""
-_GAIN = 0.75
-"""A machine that yields must miss at most this share of what the best rigid one misses."""
-_MATTERS, _SURE = 0.05, 4.0
-"""Share of the travel in contact, and standard errors of its compliance, from which a machine is named."""
-ALL = 0.95
-"""A machine that takes this share of the travel in contact leaves too little to tell a modulus by: the dent
-is then no greater than what law, zero and tip are known by."""
-_DECADES, _TIMES = 2.0, 2.0
+_DECADES = 2.0
 
 
 @dataclass(frozen=True)
@@ -49,24 +38,6 @@ class Way:
         mean = [(float(u[step == k].mean()), float(net[step == k].mean())) for k in kept]
         thin_u, thin_f = (np.array(v) for v in zip(*mean, strict=True))
         return cls(thin_u, thin_f)
-
-
-@dataclass(frozen=True)
-class Machine:
-    """modulus_pa with its 95 % interval, and stiffness_n_per_m of the machine with its own, by one fit of all
-    curves with `law`; rigid_modulus_pa: of the same law on a rigid machine.
-    error, rigid_error: held-out rms over rms of the force. takes_all: nothing of the travel is left that
-    would tell a modulus."""
-
-    modulus_pa: float
-    modulus_ci95_pa: tuple[float, float]
-    stiffness_n_per_m: float
-    stiffness_ci95_n_per_m: tuple[float, float]
-    law: str
-    rigid_modulus_pa: float
-    error: float
-    rigid_error: float
-    takes_all: bool
 
 
 def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> Way:
@@ -182,83 +153,5 @@ def _deepest(ways: Sequence[Way]) -> float:
     return max(float(w.travel[-1] - w.travel[0]) for w in ways)
 
 
-def own_moduli(ways: Sequence[Way], poisson_ratio: float, tip: Tip, machine: Machine) -> np.ndarray:
-    """(w,) Pa of each way by itself, by the machine's law and stiffness."""
-    deepest = _deepest(ways)
-    fit, start = (
-        _YieldingFit(machine.law, poisson_ratio, tip, deepest),
-        float(np.log(machine.modulus_pa)),
-    )
-    found = []
-    for way in ways:
-        less = Way(way.travel - way.push / machine.stiffness_n_per_m, way.push)
-        found.append(fit.fitted([less], [np.ones(len(way.push))], start, False)[0])
-    return np.exp(np.array(found))
-
-
-def rigid_interval(
-    ways: Sequence[Way], poisson_ratio: float, tip: Tip, modulus_pa: float, laws: Sequence[str]
-) -> tuple[float, float]:
-    """Pa, 95 %, about modulus_pa, of a fit of all ways on a rigid machine: what it changes by without each
-    block of force, over `laws`, the first of which modulus_pa is by."""
-    deepest, guess = _deepest(ways), float(np.log(modulus_pa))
-    low, high, middle = 0.0, 0.0, 0.0
-    for k, law in enumerate(laws):
-        (log_e, _), apart, _ = _YieldingFit(law, poisson_ratio, tip, deepest).left_out(ways, guess, False)
-        middle, half = (middle if k else log_e), _TIMES * float(_jackknifed(apart)[0])
-        low, high = min(low, log_e - half - middle), max(high, log_e + half - middle)
-    return modulus_pa * float(np.exp(low)), modulus_pa * float(np.exp(high))
-
-
 def _rms(ways: Sequence[Way]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([w.push for w in ways]) ** 2)))
-
-
-def machine_of(ways: Sequence[Way], poisson_ratio: float, tip: Tip, modulus_pa: float) -> Machine | None:
-    """The machine that yields, where that shows beside every law of the material. modulus_pa: a first guess.
-
-    Needs two ways in or more; None where a rigid machine does as well.
-    """
-    deepest = _deepest(ways)
-    rms = _rms(ways)
-    guess = float(np.log(modulus_pa))
-    errors: dict[tuple[str, bool], float] = {}
-    whole: dict[tuple[str, bool], tuple[float, float]] = {}
-    apart: dict[tuple[str, bool], list[tuple[float, float]]] = {}
-    for name in tip.laws:
-        fit = _YieldingFit(name, poisson_ratio, tip, deepest)
-        for yields in (False, True):
-            whole[name, yields], apart[name, yields], missed = fit.left_out(ways, guess, yields)
-            errors[name, yields] = missed / rms
-    rigid = min(tip.laws, key=lambda name: errors[name, False])
-    law = min(tip.laws, key=lambda name: errors[name, True])
-    if errors[law, True] > _BETTER * errors[tip.laws[0], True]:
-        law = tip.laws[0]
-    spread = _jackknifed(apart[law, True])
-    log_e, c = whole[law, True]
-    share = _YieldingFit(law, poisson_ratio, tip, deepest).machines_share(ways, log_e, c)
-    push = max(float(w.push.max()) for w in ways)
-    matters = c * push > _MATTERS * deepest
-    if not matters or errors[law, True] > _GAIN * errors[rigid, False] or c < _SURE * spread[1]:
-        return None
-    likely = [name for name in tip.laws if errors[name, True] <= _ALIKE * errors[law, True]]
-    ends = np.array(
-        [
-            np.array(whole[name, True]) + sign * _TIMES * _jackknifed(apart[name, True])
-            for name in {law, *likely}
-            for sign in (-1, 1)
-        ]
-    )
-    low, high = ends.min(0), ends.max(0)
-    return Machine(
-        float(np.exp(log_e)), (float(np.exp(low[0])), float(np.exp(high[0]))),
-        1 / c, (1 / high[1], 1 / max(low[1], 1e-12)),
-        law, float(np.exp(whole[law, False][0])), errors[law, True], errors[rigid, False],
-        share > ALL or log_e > guess + (_DECADES - 0.2) * np.log(10),
-    )  # fmt: skip
-
-
-def _jackknifed(again: Sequence[tuple[float, float]]) -> np.ndarray:
-    """(2,) standard errors of (log E, c) from fits that leave out a block each."""
-    values = np.array(again)
-    return np.sqrt((BLOCKS - 1) / BLOCKS * ((values - values.mean(0)) ** 2).sum(0))

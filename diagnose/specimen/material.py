@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from palpate.diagnosis.forward.touches import touches_of
-from palpate.diagnosis.specimen.approach import approach_of
+from palpate.diagnosis.specimen.approach import Approach, approach_of
 from palpate.diagnosis.specimen.baseline import without_slope
 from palpate.diagnosis.specimen.bench import PEAK_N, Bench, MachineCycle, bench_of
 from palpate.diagnosis.specimen.bench_diagnosis import (
@@ -20,14 +20,15 @@ from palpate.diagnosis.specimen.bench_diagnosis import (
     modulus_interval,
     unseen_holds,
 )
+from palpate.diagnosis.specimen.elastic_fit import ALL, Elastic, elastic_of
 from palpate.diagnosis.specimen.few_curves import (
     INDENTATION_UNKNOWN,
     MACHINE_TAKES_ALL,
     as_read,
     material_of_few,
     seen_of_all,
+    with_machine,
 )
-from palpate.diagnosis.specimen.machine_compliance import ALL
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.diagnosis.specimen.zero import bias, late_contact
 from palpate.diagnosis.verdict.result import Diagnosis
@@ -50,6 +51,12 @@ from palpate.reconstruction.machine_curves.uniaxial import (
     held_out,
 )
 
+_ELASTIC = {TOOL.name, FINITE.name}
+"""Effects that the fit of the ways in knows itself: it tells the modulus where no other is named."""
+_NO_LAYER = (
+    "the layer's thickness counts from 6 curves on: of fewer the modulus is a half-space's, too high for a "
+    "layer that is not ten times as thick as the contact is wide"
+)
 UNIAXIAL_UNKNOWN = (
     "friction at the faces",
     "Poisson's ratio",
@@ -92,13 +99,14 @@ def material_of(
     def bench(curves: Sequence[MachineCycle]) -> Bench:
         return bench_of(curves, tip, layer_m=layer_m, poisson_ratio=nu, specimens=specimens)
 
-    air = without_slope(tests.curves, tip, timed=tests.timed)
+    raw = list(tests.curves)
+    air = without_slope(tests.curves, tip, timed=tests.timed, poisson_ratio=nu, alike=not specimens)
     if len(air.slope_n_per_m):
         each = f"free air slopes by {np.median(air.slope_n_per_m):.3g} N/m of travel on the way in"
         notes = (*tests.notes, f"{each}, which is taken off, with what it is known by in the interval")
         tests = replace(tests, curves=tuple(air.curves), notes=notes)
     curves, words = late_contact(tests.curves, nu, tip)
-    found = bench(curves)
+    found, words_late = bench(curves), words
     if words is not None:
         else_pa = float(np.median(approach_of(bench(tests.curves)).modulus_pa))
         notes = (*tests.notes, f"{words}; the modulus would be {else_pa:.4g} Pa then")
@@ -107,18 +115,15 @@ def material_of(
         words = f"the force reads {read[0]:.3g} N in free air, which is taken off"
         notes = (*tests.notes, f"{words}: the modulus would be {read[1]:.4g} Pa if it were not")
         tests = replace(tests, notes=notes)
-    made = _indentation(tests, found, names, fast, seed, progress)
-    if len(air.slope_n_per_m):
-        off = np.log(bench(air.later).modulus_pa / found.modulus_pa)[found.used]
-        made = widened(made, 2 * float(np.sqrt(np.nansum(off**2))) / len(off))
+    approach = approach_of(found)
+    pull, elastic = float(approach.pull_n.max()), air.fit
+    if layer_m is not None:
+        elastic = None  # which knows half-spaces
+    elif elastic is not None and (words_late or pull > 0):
+        raw = [replace(a, level_n=b.level_n) for a, b in zip(raw, curves, strict=True)]
+        elastic = elastic_of(raw, tip, nu, pull)
+    made = _indentation(tests, found, approach, elastic, layer_m is not None, names, fast, seed, progress)
     return replace(made, tip=tip, poisson_ratio=nu, poisson_from=source)
-
-
-def widened(made: Material, log_half: float) -> Material:
-    """With what else the logarithm of its modulus is known by, 95 %."""
-    e = made.young_modulus_pa
-    low, high = (np.hypot(np.log(end / e), log_half) for end in made.young_modulus_ci95_pa)
-    return replace(made, young_modulus_ci95_pa=(e * float(np.exp(-low)), e * float(np.exp(high))))
 
 
 def _poisson_of(stated: float | None, tests: MachineTests) -> tuple[float, str]:
@@ -204,19 +209,30 @@ def _relaxation(tests: MachineTests, names: tuple[str, ...]) -> Material:
 
 
 def _indentation(
-    tests: MachineTests, bench: Bench, names: tuple[str, ...], fast: bool, seed: int, progress: Progress
+    tests: MachineTests,
+    bench: Bench,
+    approach: Approach,
+    elastic: Elastic | None,
+    layered: bool,
+    names: tuple[str, ...],
+    fast: bool,
+    seed: int,
+    progress: Progress,
 ) -> Material:
     unused = [c.name for c, u in zip(tests.curves, bench.used, strict=True) if not u]
     notes = list(tests.notes)
     notes += [f"without a contact, left out: {', '.join(unused)}"] if unused else []
     if np.isfinite(tests.stated_modulus_pa):
         notes.append(f"the maker's software states {tests.stated_modulus_pa:.4g} Pa")
-    approach = approach_of(bench)
     made = None
     if bench.tip.form == "sphere" and tests.timed:
         made = diagnose_bench(bench, fast=fast, seed=seed, progress=progress)
     if made is None:
-        return material_of_few(tests, bench, approach, names, notes)
+        if elastic is None:
+            notes += [_NO_LAYER] if layered else []
+            assert tests.tip is not None
+            elastic = elastic_of(tests.curves, tests.tip, bench.model.material.poisson_ratio)
+        return material_of_few(tests, bench, approach, elastic, names, notes)
     own = bench.modulus_pa[bench.used]
     error = _held_out_errors(bench, made)
     holds = unseen_holds(bench, made)
@@ -233,11 +249,14 @@ def _indentation(
     parameters = _named_parameters(bench, made)
     takes_all = _takes_all(bench, parameters)
     at_bound += (MACHINE_TAKES_ALL,) if takes_all else ()
+    if elastic is not None and set(made.effects) <= _ELASTIC:
+        modulus, interval = elastic.modulus_pa, as_read(elastic.modulus_pa, elastic.interval_pa)
     if made.effects:
         plain = quantity_words("young_modulus_pa", ideal)
         notes.append(f"without {_listed(made.effects)} the modulus would be {plain}")
+    elastically = elastic is not None and set(made.effects) <= _ELASTIC and TOOL.name not in made.effects
     tested = {e.name for e in effects()} - set(made.left_out)
-    return Material(
+    told = Material(
         kind="indentation",
         files=names,
         curves=len(own),
@@ -259,6 +278,7 @@ def _indentation(
         odds=tests.odds,
         seen=seen_of_all(bench, made),
     )
+    return with_machine(told, elastic) if elastically and elastic is not None else told
 
 
 def _takes_all(bench: Bench, parameters: dict[str, dict[str, Any]]) -> bool:

@@ -26,6 +26,16 @@ _SPHERE_LAWS = ("sphere", "hertz", "linear", "neo-hookean")
 _OF_TANGENT = {"cone": 2 / np.pi, "pyramid": 0.7453}
 
 
+def other_tip(form: str, where: str, file: str = "FILE") -> str:
+    """Why presses of an object by a tip of another form are refused, and the command that reads them."""
+    size = "--tip-angle DEGREES" if form in POINTED else "--tip-radius M"
+    return (
+        f"{where} is {form}, and shapes, models and their forces are of a sphere alone, under whose laws "
+        f"{WORDS[form]} gives a wrong modulus. Straight presses of one flat piece are read as a machine's "
+        f"curves: palpate material {file} --tip {form} {size} --column t=t --column depth=-z --column load=fz"
+    )
+
+
 @dataclass(frozen=True)
 class Tip:
     """form: of FORMS. radius_m: m, of a sphere or of a punch's end; half_angle_deg: of a cone or pyramid.

@@ -1,4 +1,8 @@
-"""What parts a mesh says that it has: closed bodies beside or inside one another, and labels of its cells."""
+"""What parts a mesh says that it has: closed bodies beside or inside one another, and labels of its cells.
+
+Each part is what its own triangles enclose; where parts overlap, as a tumour in a liver, the smaller one
+counts.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +19,37 @@ _MOST = 50
 
 @dataclass(frozen=True)
 class Part:
-    """A body or label, and its volume, m^3."""
+    """A body or label: its volume, m^3, and its own closed surface, vertices (n, 3) m in the file's frame,
+    triangles (k, 3)."""
 
     name: str
     volume_m3: float
+    vertices: np.ndarray
+    triangles: np.ndarray
 
 
-def words_of(parts: Sequence[Part]) -> str:
-    """'liver 1200 cm³, tumour 4.2 cm³'."""
-    return ", ".join(f"{part.name} {1e6 * part.volume_m3:.4g} cm³" for part in parts)
+def words_of(parts: Sequence[Part], moduli: Mapping[str, float] | None = None) -> str:
+    """'liver 1200 cm³, tumour 4.2 cm³'; with the modulus of each, Pa, where it has one."""
+    return ", ".join(
+        f"{part.name} {1e6 * part.volume_m3:.4g} cm³"
+        + (f" of {moduli[part.name] / 1e3:.4g} kPa" if moduli else "")
+        for part in parts
+    )
+
+
+def shares(parts: Sequence[Part], points: np.ndarray) -> np.ndarray:
+    """(m, parts) share of each cell's points (m, q, 3) m in each part; a point in none is of the largest."""
+    import pyvista
+
+    flat = points.reshape(-1, 3)
+    order = sorted(range(len(parts)), key=lambda k: -parts[k].volume_m3)
+    owner = np.full(len(flat), order[0])
+    cloud = pyvista.PolyData(flat)
+    for k in order[1:]:
+        shell = pyvista.PolyData.from_regular_faces(parts[k].vertices, parts[k].triangles)
+        found = cloud.select_interior_points(shell, check_surface=False)
+        owner[np.asarray(found["selected_points"], dtype=bool)] = k
+    return (owner.reshape(points.shape[:2])[:, :, None] == np.arange(len(parts))).mean(axis=1)
 
 
 def bodies(shell: Any, path: Path | None, metres: float) -> tuple[Part, ...]:
@@ -38,7 +64,9 @@ def bodies(shell: Any, path: Path | None, metres: float) -> tuple[Part, ...]:
         off = {name: float(np.abs(body.bounds - bounds).max()) for name, bounds in named.items()}
         near = min(off, key=lambda name: off[name]) if off else ""
         name = near if off and off[near] < 1e-3 * float(body.scale) else f"body {k + 1}"
-        found.append(Part(name, abs(float(body.volume)) * metres**3))
+        triangles = np.asarray(body.faces, dtype=np.int64)
+        volume = abs(float(body.volume)) * metres**3
+        found.append(Part(name, volume, np.asarray(body.vertices) * metres, triangles))
     return tuple(found)
 
 
@@ -72,10 +100,20 @@ def labels(grid: Any, names: Mapping[int, str], metres: float) -> tuple[Part, ..
             continue
         sizes = np.abs(grid.compute_cell_sizes(length=False, area=False)["Volume"]) * metres**3
         return tuple(
-            Part(names.get(int(value), f"{key} {int(value)}"), float(sizes[values == value].sum()))
+            Part(
+                names.get(int(value), f"{key} {int(value)}"),
+                float(sizes[values == value].sum()),
+                *_boundary(grid.extract_cells(np.flatnonzero(values == value)), metres),
+            )
             for value in which
         )
     return ()
+
+
+def _boundary(grid: Any, metres: float) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices, m, and triangles of the outer faces of solid cells."""
+    faces = grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=0).triangulate()
+    return np.asarray(faces.points, dtype=float) * metres, np.asarray(faces.regular_faces, dtype=np.int64)
 
 
 _NO_LABELS = ("vtkOriginalCellIds", "cell_ids", "gmsh:geometrical")

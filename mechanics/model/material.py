@@ -183,6 +183,11 @@ def mixed_ratio(share: np.ndarray, modulus_ratio: float) -> np.ndarray:
     return 1 + share * (modulus_ratio - 1) / (1 + 0.4 * (1 - share) * (modulus_ratio - 1))
 
 
+def mixed_of(shares: np.ndarray, ratios: np.ndarray) -> np.ndarray:
+    """(m,) as `mixed_ratio`, of shares (m, k) of several materials of moduli (k,) over the matrix's."""
+    return 1 / (shares / (ratios + 1.5)).sum(axis=1) - 1.5
+
+
 def balls_ratio(mesh: TetMesh, balls: Iterable[Ball]) -> np.ndarray:
     """(m,) of all balls: 1 outside; those that overlap multiply. No limits."""
     ratio = np.ones(len(mesh.tetrahedra))

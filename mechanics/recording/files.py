@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.bounds import LARGEST_N
+from palpate.mechanics.contact.tip import FORMS
 from palpate.mechanics.disk.reading import no_file, reading
 from palpate.mechanics.disk.schema import ANY, FileKey, Listed, Schema
 from palpate.mechanics.disk.surface_files import UNITS
@@ -165,6 +166,8 @@ SCHEMA: Schema = {
     },
     "tool": {
         "tip_radius_m": TIP_RADIUS,
+        "tip": FileKey(str, choices=FORMS),
+        "tip_angle_deg": FileKey(low=0.0, high=90.0, unit="deg"),
         "mass_kg": TOOL_MASS,
         "calibration": FileKey(str),
     },

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.contact.tip import other_tip
 from palpate.mechanics.disk.reading import named_in, read_toml, sha256_of_file
 from palpate.mechanics.disk.schema import check_table
 from palpate.mechanics.disk.store import content_key
@@ -195,6 +196,8 @@ def read_recording(path: Path | str) -> Recording:
         warnings.warn(note, NotRead, stacklevel=2)
     about, sensor = table.get("recording", {}), table.get("sensor", {})
     thing, tool = table.get("object", {}), table.get("tool", {})
+    if tool.get("tip", "sphere") != "sphere":
+        raise RecordingError(other_tip(tool["tip"], f"'{description}': [tool] tip", str(samples)))
     for name, part, key in (("recording", about, "force_on"), ("tool", tool, "tip_radius_m")):
         if key not in part:
             words = SCHEMA[name][key].words  # type: ignore[index, union-attr]

@@ -193,9 +193,11 @@ def _form_by_curves(
     against = float(np.exp(min(scores[other] - scores["sphere"], np.log(MOST_ODDS))))
     named = POINTED if other == "cone" else (other,)
     either = listed((WORDS[form] for form in named), "or")
+    weighed = f"odds against a sphere {against:.2g} to 1"
+    if against < 1:
+        weighed = f"as likely as a sphere on a machine that yields: {against:.2g} to 1"
     raise Unclear(
-        f"the form of the tip is in no file, and the force grows as {either} gives it (odds against a sphere "
-        f"{against:.2g} to 1)",
+        f"the form of the tip is in no file, and the force grows as {either} gives it ({weighed})",
         "tip",
         (*named, "sphere"),
     )

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from palpate.mechanics.contact.tip import FORMS
 from palpate.mechanics.disk.surface_files import UNITS, is_surface_file
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.names import pairs
+from palpate.mechanics.names import number, pairs
+from palpate.mechanics.plausible import YOUNG_MODULUS
 from palpate.operations._declare import argument, option
 from palpate.operations._to_argparse import finite, natural
 from palpate.render.registry import names, simulator_names
@@ -118,15 +119,46 @@ def _offset(text: str) -> float | str:
     return text if text == "auto" else seconds(text, "--offset")
 
 
+def modulus_option() -> Mapping[str, Any]:
+    """--modulus PA, or NAME=PA of each part of a mesh; in Python a number, or {part: Pa, '': of the
+    others}."""
+    words = "Young's modulus; of a mesh of several parts NAME=PA (repeatable); None: 20000, of one part"
+    return option(words, unit="Pa", flag="--modulus", metavar="PA", count="repeat", parse=str)
+
+
+def moduli(given: Any) -> Any:
+    """A number or {part: Pa} of what was said by `modulus_option`, None of nothing. Raises OptionError for
+    what is no modulus."""
+    if isinstance(given, list):
+        flag = "--modulus"
+        named: dict[str, float] = {}
+        for word in given:
+            name, equals, value = str(word).rpartition("=")
+            if name in named:
+                raise OptionError(f"{flag} is said twice{f' of {name}' if name else ''}: say it once")
+            named[name] = number(flag, name, value) if equals else _plain(word)
+        given = named[""] if set(named) == {""} else named
+    for name, value in given.items() if isinstance(given, Mapping) else [("", given)]:
+        if value is not None and not YOUNG_MODULUS.takes(value):
+            of = f" of {name}" if name else ""
+            raise OptionError(f"--modulus{of} is {value!r}; it must be {YOUNG_MODULUS.words}")
+    return given
+
+
+def _plain(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        raise OptionError(f"--modulus is '{word}'; it must be a number in Pa, or NAME=PA of a part") from None
+
+
 @dataclass(frozen=True)
 class MeshFileOptions:
     """How a surface's file (STL, OBJ, PLY, glTF, VTP, VTU, MSH, INP) is meant, where one is the object."""
 
     title = "a surface's file as the object"
 
-    young_modulus_pa: float | None = field(
-        default=None, metadata=option("Young's modulus; None: 20000", unit="Pa", flag="--modulus")
-    )
+    young_modulus_pa: float | Mapping[str, float] | None = field(default=None, metadata=modulus_option())
     poisson_ratio: float | None = field(
         default=None, metadata=option("Poisson's ratio; None: 0.49", flag="--nu")
     )
@@ -144,8 +176,8 @@ _OF_A_FILE = ("unit", "up", "sink_m")
 def _meant(said: Mapping[str, Any]) -> dict[str, Any]:
     """What was said of a surface's file, by field of a scene. Raises OptionError for no modulus."""
     given = {name: value for name, value in said.items() if value is not None}
-    if not given.get("young_modulus_pa", 1.0) > 0:
-        raise OptionError(f"--modulus is {given['young_modulus_pa']} Pa; it must be greater than 0")
+    if "young_modulus_pa" in given:
+        given["young_modulus_pa"] = moduli(given["young_modulus_pa"])
     return given
 
 

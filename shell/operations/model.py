@@ -7,6 +7,7 @@ take; with a recording of the object, 'palpate reconstruct REC --shape FILE' fin
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +15,14 @@ from palpate.mechanics.disk.surface_files import is_surface_file
 from palpate.mechanics.errors import OptionError
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, argument, operation, option
-from palpate.operations._shared import MODEL, MeshFileOptions, given_scene, save_option
+from palpate.operations._shared import (
+    MODEL,
+    MeshFileOptions,
+    given_scene,
+    moduli,
+    modulus_option,
+    save_option,
+)
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -30,9 +38,7 @@ def model_of(
             reads=True,
         ),
     ],
-    young_modulus_pa: Annotated[
-        float | None, option("Young's modulus; None: 20000", unit="Pa", flag="--modulus")
-    ] = None,
+    young_modulus_pa: Annotated[float | Mapping[str, float] | None, modulus_option()] = None,
     *,
     save: Annotated[
         str | Path | None, save_option("folder of the model to write", "MODEL", MODEL, needed=True)
@@ -52,15 +58,15 @@ def model_of(
     from palpate.scenes.build import model_of_mesh
     from palpate.scenes.scene import Scene
 
-    given: dict[str, Any] = file
+    given: dict[str, Any] = {**file, "young_modulus_pa": moduli(young_modulus_pa)}
     if isinstance(shape, str | Path) and not is_surface_file(Path(shape)):
-        scene = given_scene(shape, file)
+        scene = given_scene(shape, given)
         shape, given = (
             scene.source,
             {name: getattr(scene, name) for name in MeshFileOptions.__dataclass_fields__},
         )
     scene = Scene("mesh", "mesh", "", tip_radius_m=tip_radius_m, mesh_size_m=mesh_size_m, **given)
-    for name in ("young_modulus_pa", "tip_radius_m", "mesh_size_m"):
+    for name in ("tip_radius_m", "mesh_size_m"):
         value = getattr(scene, name)
         if value is not None and not value > 0:
             raise OptionError(f"{name} is {value}; it must be greater than 0")

@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from palpate.mechanics.contact.tip import other_tip
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import flag_of
 from palpate.operations._call import Call
@@ -26,6 +27,8 @@ from palpate.operations._shared import (
     TipAngle,
     TipForm,
     columns_option,
+    moduli,
+    modulus_option,
     named,
     offset_option,
     report_option,
@@ -84,9 +87,7 @@ def open(
     layer_m: Annotated[
         float | None, option("thickness of a machine's sample; None: a half-space", unit="m", advanced=True)
     ] = None,
-    young_modulus_pa: Annotated[
-        float | None, option("Young's modulus, for a surface file", unit="Pa", flag="--modulus")
-    ] = None,
+    young_modulus_pa: Annotated[float | Mapping[str, float] | None, modulus_option()] = None,
     fast: Annotated[bool, option("try fewer effects", advanced=True)] = False,
     seed: Seed = 0,
     how: Given[ReconstructOptions],
@@ -117,14 +118,14 @@ def open(
     _refuse_idle(kind, files[0], how)
     of_tip = {"tip": tip, "tip_angle_deg": tip_angle_deg}
     if kind != "curves":
-        _sphere_alone(of_tip)
+        _sphere_alone(tip, tip_angle_deg, files[0])
     opened = {"files": files, "save": save, **of_log, **how}
     made = partial(_reconstructed, files, opened, how, save=save, seed=seed, progress=call.wanted)
     match kind:
         case "model":
             result = _model(files)
         case "mesh":
-            result = _mesh(files, save, tip_radius_m, young_modulus_pa, how, call.wanted)
+            result = _mesh(files, save, tip_radius_m, moduli(young_modulus_pa), how, call.wanted)
         case "curves":
             of_machine = {"travel": travel, "compression": compression, "layer_m": layer_m, "fast": fast}
             result = _curves(files, seed=seed, progress=call.wanted, **of_file, **of_machine, **of_tip, **how)
@@ -150,7 +151,7 @@ def _mesh(
     files: tuple[Any, ...],
     save: str | Path | None,
     tip_radius_m: float | None,
-    modulus_pa: float | None,
+    modulus_pa: Any,
     how: Mapping[str, Any],
     progress: bool | Progress,
 ) -> Opened:
@@ -251,15 +252,11 @@ def _reconstructed(
     )
 
 
-def _sphere_alone(of_tip: Mapping[str, Any]) -> None:
+def _sphere_alone(tip: str | None, angle_deg: float | None, file: Any) -> None:
     """Raise OptionError for a tip that recordings, surfaces and models know nothing of."""
-    for name, value in of_tip.items():
-        if value not in (None, "sphere"):
-            flag = "--" + name.removesuffix("_deg").replace("_", "-")
-            raise OptionError(
-                f"{flag} is {value}, and an object is pressed by a sphere alone: leave {flag} out (a "
-                "machine's curves take other tips)"
-            )
+    form = tip or ("sphere" if angle_deg is None else "cone")
+    if form != "sphere":
+        raise OptionError(other_tip(form, "--tip", str(file)))
 
 
 def _only(files: tuple[Any, ...]) -> Any:

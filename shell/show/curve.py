@@ -14,7 +14,7 @@ from palpate.render.press import Curve
 from palpate.show import story as say
 from palpate.show.colours import COLOURS, colour_of
 from palpate.show.page import feel_step
-from palpate.words import kpa, mm, unsettled_words
+from palpate.words import kpa, mm, part_words, unsettled_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
     )
     yield say.Detail(
         f"the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s; the object's "
-        f"Young's modulus is {kpa(made.material.young_modulus_pa, '.4g')}"
+        f"Young's modulus{part_words(made)} is {kpa(made.material.young_modulus_pa, '.4g')}"
     )
     if result.unsettled:
         yield say.Sentence(unsettled_words(result.unsettled, len(result.t)))

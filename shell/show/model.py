@@ -28,7 +28,7 @@ from palpate.show.quantities import (
 )
 from palpate.show.scenery import AZIMUTH_DEG, add_dots, add_object, draw_touched, level_axes
 from palpate.show.view3d import Colouring, Line, Thing, Traces, View
-from palpate.words import kpa, mm, sure
+from palpate.words import kpa, mm, part_words, sure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -172,9 +172,10 @@ def presses_words(model: Model) -> str:
 
 
 def parts_words(model: Model) -> str:
-    """What of a mesh that holds several bodies or labels was made one; '' where it is one."""
+    """What a mesh holds of several bodies or labels, and what was made of them; '' where it is one."""
     parts = model.provenance.get("parts", "")
-    return f"the file holds {parts}: all of it is taken for one solid of one modulus" if parts else ""
+    one = "" if part_words(model) else ": all of it is taken for one solid of one modulus, as was said"
+    return f"the file holds {parts}{one}" if parts else ""
 
 
 def mended_words(model: Model) -> str:
@@ -188,7 +189,7 @@ def modulus_words(model: Model) -> str:
     """The Young's modulus with its 95 % interval, kPa."""
     ends = model.material.young_modulus_ci95_pa
     interval = f" ({sure(*(f'{end / 1e3:.1f}' for end in ends))})" if np.isfinite(ends).all() else ""
-    return f"Young's modulus {kpa(model.material.young_modulus_pa)}{interval}"
+    return f"Young's modulus{part_words(model)} {kpa(model.material.young_modulus_pa)}{interval}"
 
 
 def save(model: Model, path: Path | str) -> Model:

@@ -145,3 +145,13 @@ def test_toml_text_comes_back_as_it_was() -> None:
     assert read["deep"] == {"er": {"key with space": [1, 2]}, "tables": [{"at": [1, 2]}, {"at": [3, 4]}]}
     assert "m = [\n    [1.0, 0.0],\n    [0.0, 1.0],\n]\n" in text
     assert "v = [0.0, 0.001, -2.5]\n" in text  # a vector is one line to those who read it or cut it out
+
+
+@pytest.mark.parametrize("form", ["punch", "cone", "pyramid"])
+def test_a_tip_of_another_form_is_refused_with_the_command_that_reads_it(tmp_path, form):
+    toml = TOML.format(force_on="tool")
+    with pytest.raises(RecordingError, match=f"palpate material .*rec.csv --tip {form} --tip-"):
+        read_recording(written(tmp_path, toml=f'{toml}tip = "{form}"\n'))
+    assert read_recording(written(tmp_path, toml=f'{toml}tip = "sphere"\n')).tip_radius_m == 0.005
+    with pytest.raises(RecordingError, match="sphere, punch, cone, pyramid"):
+        read_recording(written(tmp_path, toml=f'{toml}tip = "ball"\n'))

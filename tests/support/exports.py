@@ -20,9 +20,9 @@ _TIMES = {"s": 1.0, "ms": 1e-3}
 
 @dataclass(frozen=True)
 class Export:
-    """A file. kind: "curves" or "recording"; young_modulus_pa: of curves; force_on_tool (n, 3) N: of a
-    recording; tip_radius_m: stated beside the file (None: the file's own text says it); traits: how it was
-    written."""
+    """A file. kind: "curves" or "recording", of strange ones also "parts" or "frame"; young_modulus_pa: of
+    curves; force_on_tool (n, 3) N: of a recording; tip_radius_m: stated beside the file (None: the file's own
+    text says it); traits: how it was written."""
 
     path: Path
     kind: str
@@ -34,6 +34,8 @@ class Export:
     columns: Mapping[str, str] = field(default_factory=dict)
     """Said beside a file whose columns have no names."""
     units: Mapping[str, str] = field(default_factory=dict)
+    said: Mapping[str, Any] = field(default_factory=dict)
+    """Said beside a file, by name of `pp.material`."""
 
 
 CONTAINERS = {

@@ -40,14 +40,16 @@ def test_a_slope_or_a_drift_of_free_air_moves_no_modulus_and_loses_no_work(slope
 
 
 def test_what_a_slope_is_known_by_is_wider_where_little_air_tells_it():
-    def error(rows: int) -> float:
+    def width(rows: int) -> float:
         c = curve(0.4)
         way_in = slice(rows, int(np.argmax(c.force)) + 1)
         found = without_slope([MachineCycle(c.t[way_in], c.travel[way_in], c.force[way_in])], TIP)
         assert found.slope_n_per_m == pytest.approx([0.4], rel=0.1)
-        return float((found.later[0].force - found.curves[0].force)[-1])
+        low, high = found.fit.interval_pa
+        assert low < MODULUS < high and found.fit.slope_error_n_per_m[0] > 0
+        return float(np.log(high / low))
 
-    assert error(45) > 2 * error(0) > 0
+    assert width(60) > 1.2 * width(0) > 0
 
 
 def test_a_contact_from_the_first_row_on_is_no_slope():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from palpate.diagnosis.specimen.bench import MachineCycle
-from palpate.diagnosis.specimen.machine_compliance import machine_of, way_of
+from palpate.diagnosis.specimen.elastic_fit import NAMED, elastic_of
 from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.mechanics.contact.dent import dent_law
@@ -59,12 +59,29 @@ def test_a_machine_that_yields_is_told_with_its_stiffness(modulus, share):
 
 @pytest.mark.parametrize("law", ["sphere", "neo-hookean", "linear"])
 def test_a_rigid_machine_is_not_named_whatever_the_law(law):
-    rng, ways = np.random.default_rng(3), []
+    rng, given = np.random.default_rng(3), []
     for _ in range(3):
         dent = np.concatenate([np.linspace(-0.4e-3, 0, 80)[:-1], np.linspace(0, 0.3 * RADIUS, 400)])
         force = np.asarray(dent_law(law).force(np.maximum(dent, 0), 5e4, 0.49, RADIUS))
-        ways.append(way_of(dent, force + 0.003 * force.max() * rng.standard_normal(len(dent)), 0.0))
-    assert machine_of(ways, 0.49, TIP, 4e4) is None
+        force += 0.003 * force.max() * rng.standard_normal(len(dent))
+        given.append(MachineCycle(np.arange(len(dent)) / 100, dent, force))
+    found = elastic_of(given, TIP, 0.49)
+    assert not found.machine and found.yields < NAMED
+    assert found.interval_pa[0] < 5e4 < found.interval_pa[1]
+
+
+@pytest.mark.parametrize("law", ["hertz", "neo-hookean"])
+@pytest.mark.parametrize("slope", [-0.15, 0.0, 0.1])
+def test_noise_and_a_slope_hide_no_machine_and_the_interval_holds_the_modulus(law, slope):
+    """One curve of 0.8 % noise by a machine three times as stiff as the contact: a rigid one is 20 % off."""
+    rng, modulus = np.random.default_rng(0), 1e5
+    dent = np.linspace(-0.1 * RADIUS, 0.25 * RADIUS, 500)
+    force = np.asarray(dent_law(law).force(np.maximum(dent, 0), modulus, 0.49, RADIUS))
+    travel = dent + force / (3 * 1.5 * force[-1] / dent[-1])
+    read = force + slope * force[-1] * travel / dent[-1] + 0.008 * force[-1] * rng.standard_normal(500)
+    found = elastic_of([MachineCycle(np.arange(500) / 100, travel, read)], TIP, 0.49)
+    assert found.machine and found.interval_pa[0] < modulus < found.interval_pa[1] < 1.4 * modulus
+    assert abs(np.log(found.rigid_pa / modulus)) > 0.1
 
 
 def test_a_slope_of_free_air_is_taken_off_and_said():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
+from benchmarks.foreign_files import outcome_of
 from palpate import cli
 from palpate.importing.headers import header_of
 from palpate.importing.meaning import (
@@ -23,6 +24,7 @@ from palpate.importing.meaning import (
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import RecordingError
 from tests.support.exports import export
+from tests.support.strange_exports import KINDS, strange_export
 
 RADIUS, MODULUS = 0.003, 10e6
 
@@ -233,3 +235,9 @@ def test_files_as_people_export_them_are_right_or_asked(tmp_path, seed):
             assert np.allclose(read.position, made.position, atol=1e-6)
     except RecordingError as refused:
         assert "--" in str(refused)
+
+
+@pytest.mark.parametrize("seed", range(len(KINDS)), ids=KINDS)
+def test_what_nobody_had_tried_is_right_or_asked(tmp_path, seed):
+    outcome = outcome_of(strange_export(tmp_path, seed))
+    assert outcome in ("understood and right", "asked", "refused with a cure")

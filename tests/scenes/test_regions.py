@@ -1,0 +1,87 @@
+"""A mesh of several parts: each is listed, asked for, and becomes a region of its own modulus."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista
+import trimesh
+
+import palpate as pp
+from palpate.mechanics.disk.surface_files import read_surface
+from palpate.scenes.regions import REST, LimitedModulus, moduli_of
+
+LIVER_PA, TUMOUR_PA = 5e3, 40e3
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """A block of 60 x 60 x 30 mm with a ball of 8 mm radius under the middle of its top, as an OBJ file."""
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=8)
+    ball.apply_translation([0, 0, 19])
+    block = trimesh.creation.box(extents=(60, 60, 30))
+    block.apply_translation([0, 0, 15])
+    lines, before = [], 1
+    for name, body in (("liver", block), ("tumour", ball)):
+        lines.append(f"o {name}")
+        lines += ["v {} {} {}".format(*v) for v in body.vertices]
+        lines += ["f {} {} {}".format(*(f + before)) for f in body.faces]
+        before += len(body.vertices)
+    path = tmp_path_factory.mktemp("parts") / "organ.obj"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_file_of_parts_asks_for_the_modulus_of_each(file):
+    with pytest.raises(pp.PalpateError, match="liver 108 cm³, tumour 2.0.* --modulus tumour=PA"):
+        pp.model_of(file, unit="mm", progress=False)
+    with pytest.raises(pp.PalpateError, match="liver=PA"):
+        pp.model_of(file, {"tumour": TUMOUR_PA}, unit="mm", progress=False)
+    with pytest.raises(pp.PalpateError, match="liver, tumour"):
+        pp.model_of(file, {"tumor": TUMOUR_PA, "liver": LIVER_PA}, unit="mm", progress=False)
+
+
+def test_a_harder_part_than_a_model_holds_is_said(file):
+    parts = read_surface(file, "mm").parts
+    with pytest.warns(LimitedModulus, match="250000 Pa is taken"):
+        assert moduli_of(parts, {REST: LIVER_PA, "tumour": 1e9}, "organ.obj")["tumour"] == 50 * LIVER_PA
+
+
+@pytest.mark.slow
+def test_parts_are_regions_of_their_own_modulus(file, tmp_path):
+    moduli = {"liver": LIVER_PA, "tumour": TUMOUR_PA}
+    made = pp.model_of(file, moduli, unit="mm", save=tmp_path / "MODEL", progress=False)
+    cells = pyvista.read(tmp_path / "MODEL" / "mesh.vtu")
+    centres, young = cells.cell_centers().points, np.asarray(cells.cell_data["young_modulus_pa"])
+    away = np.linalg.norm(centres - [0, 0, 0.019], axis=1)
+    assert young[away > 0.015] == pytest.approx(LIVER_PA, rel=1e-6)
+    assert young[away < 0.003] == pytest.approx(TUMOUR_PA, rel=0.3)
+    # what of the ball's volume is harder, whatever the mesh
+    harder = float(made.mesh.volumes @ (young > 2 * LIVER_PA))
+    assert harder == pytest.approx(4 / 3 * np.pi * 0.008**3, rel=0.5)
+    plain = pp.model_of(file, LIVER_PA, unit="mm", progress=False)
+    at = {"direction": (0, 0, -1), "depth_m": 0.003, "speed_m_per_s": 0.01, "progress": False}
+    over, beside = (
+        pp.press(tmp_path / "MODEL", at=(x, 0, 0.03), **at).peak_force_n
+        / pp.press(plain, at=(x, 0, 0.03), **at).peak_force_n
+        for x in (0.0, 0.02)
+    )
+    assert 1.15 < over < 3 and 0.95 < beside < 1.2
+
+
+@pytest.mark.slow
+def test_labels_are_regions_up_to_the_surface(tmp_path):
+    """Two halves side by side: a press of each, and what 1D models read of it, is of its own modulus."""
+    grid = pyvista.ImageData(dimensions=(7, 5, 4), spacing=(10, 10, 10)).cast_to_unstructured_grid()
+    grid.cell_data["label"] = np.where(grid.cell_centers().points[:, 0] > 30, 2, 1)
+    grid.save(tmp_path / "halves.vtu")
+    moduli = {"label 2": TUMOUR_PA, REST: LIVER_PA}
+    made = pp.model_of(tmp_path / "halves.vtu", moduli, unit="mm", progress=False)
+    at = {"direction": (0, 0, -1), "depth_m": 0.001, "speed_m_per_s": 0.01, "progress": False}
+    soft, hard = (pp.press(made, at=(x, 0.02, 0.03), **at).peak_force_n for x in (0.01, 0.05))
+    assert hard / soft == pytest.approx(TUMOUR_PA / LIVER_PA, rel=0.15)
+    inside = np.abs(made.presses.point[:, 0] - 0.03) > 0.012
+    hand = made.presses.point[:, 0] > 0.03
+    stiff = made.presses.fits["k_v"]
+    assert np.median(stiff[hand & inside]) / np.median(stiff[~hand & inside]) > 4
+    assert made.presses.fits["e_pa"][hand & inside] == pytest.approx(TUMOUR_PA, rel=0.05)
