@@ -45,7 +45,7 @@ def _dome(radius: float = 30.0, height: float = 40.0) -> trimesh.Trimesh:
     return trimesh.creation.revolve(np.vstack([foot, profile]), sections=64)
 
 
-def _organ(seed: int = 0) -> trimesh.Trimesh:
+def organ(seed: int = 0) -> trimesh.Trimesh:
     """A lumpy ellipsoid of 120 x 80 x 60 mm without a flat foot."""
     ball = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
     random = np.random.default_rng(seed)
@@ -129,7 +129,7 @@ def _crossing() -> Drawn:
 
 def _chest() -> Drawn:
     """Two organs beside one another, one 12 mm higher."""
-    left, right = _organ(3), _organ(4)
+    left, right = organ(3), organ(4)
     left.apply_translation([70, 0, 0])
     right.apply_translation([-70, 0, 12])
     return Drawn(_together([left, right]), None)
@@ -166,7 +166,7 @@ ZOO: dict[str, Callable[[], Drawn]] = {
     "dome, inside out": _inverted,
     "dome, a hole in its side": _pierced,
     "dome, a soup": _soup,
-    "organ without a flat foot": lambda: Drawn(_organ(), None),
+    "organ without a flat foot": lambda: Drawn(organ(), None),
     "two organs": _chest,
     "ball": lambda: Drawn(trimesh.creation.icosphere(subdivisions=4, radius=30), None),
     "crossing blocks": _crossing,

@@ -79,7 +79,7 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
     measured = recording.force_on_tool
     renderer, modulus = create("fem", model, on_demand=True), model.material.young_modulus_pa
     for _ in range(REPLAYS):
-        forces = np.where(counted[:, None], replay_recording(renderer, recording), 0.0)
+        forces = np.where(counted[:, None], replay_recording(renderer, recording, checked=False), 0.0)
         meets = np.add.reduceat((forces * measured).sum(axis=1), begins)
         power = np.add.reduceat((forces**2).sum(axis=1), begins)
         felt = power > 0
@@ -96,12 +96,16 @@ class Improvement:
 
     given_n, improved_n: N rms of the force's 3-vector while pressing, of the model that was given and of this
     one. left_out: asserted effects that it does without, as its force would be farther off with them.
+    unsettled: samples of both replays, of so many (`samples`), whose force did not settle: the one before
+    stands there.
     """
 
     model: Model
     given_n: float
     improved_n: float
     left_out: tuple[str, ...] = ()
+    unsettled: int = 0
+    samples: int = 0
 
 
 def improvement(model: Model, diagnosis: Verdict, recording: Recording) -> Improvement:
@@ -110,11 +114,12 @@ def improvement(model: Model, diagnosis: Verdict, recording: Recording) -> Impro
 
     recording: read right (`corrected`).
     """
-    given_n = replayed_gap_n(model, recording)
+    given_n, held = replayed_gap(model, recording)
 
     def without(names: Sequence[str]) -> Improvement:
         better = with_replayed_modulus(improved(model, diagnosis, names)[0], recording)
-        return Improvement(better, given_n, replayed_gap_n(better, recording), tuple(names))
+        improved_n, own = replayed_gap(better, recording)
+        return Improvement(better, given_n, improved_n, tuple(names), held + own, 2 * len(recording.t))
 
     rendered, found = improved(model, diagnosis)[1], without(())
     while found.improved_n > given_n * (1 + WORSE) and rendered:
@@ -124,13 +129,17 @@ def improvement(model: Model, diagnosis: Verdict, recording: Recording) -> Impro
     return found
 
 
-def replayed_gap_n(model: Model, recording: Recording) -> float:
-    """N rms of measured less rendered force while pressing; nan where the recording has no press."""
+def replayed_gap(model: Model, recording: Recording) -> tuple[float, int]:
+    """(N rms of measured less rendered force while pressing, nan where the recording has no press; samples
+    whose force did not settle)."""
     from palpate.render.registry import create
     from palpate.render.replay import replay_error, replay_recording
 
-    forces = replay_recording(create("fem", model, on_demand=True), recording)
-    return replay_error(recording, model.presses, forces).rmse_n
+    held: list[int] = []
+    forces = replay_recording(
+        create("fem", model, on_demand=True), recording, unsettled=held.append, checked=False
+    )
+    return replay_error(recording, model.presses, forces).rmse_n, sum(held)
 
 
 def with_effects(model: Model, named: Mapping[str, Mapping[str, Any]]) -> Model:

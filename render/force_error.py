@@ -12,15 +12,23 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from palpate.mechanics.compliance.coarse_table import CoarseCompliance
+from palpate.mechanics.compliance.sites import principal_curvatures
 from palpate.mechanics.contact.edges import nearness
+from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
+from palpate.mechanics.model.model import Model
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.render.base import Renderer
+from palpate.render.effects import rendered_touch
 from palpate.render.fem.renderer import FemRenderer
+from palpate.render.options import RenderOptions
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.render.surface.snapping import ONSET_NOISE_M
 
 SURE = 1.96
+COARSE_DEPTH, _STEPS = 0.6, 7
+"""Of the press by which a coarse table's error is stated, in tip radii; and its steps."""
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
 
@@ -73,6 +81,34 @@ def said(figures: dict[str, float]) -> str:
         return ""
     law, shape, touch = (f"{1e3 * value:.3g}" for value in figures.values())
     return f"may be off (95 %) by {law} mN for the law, {shape} for the shape, {touch} for its first touches"
+
+
+def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOptions) -> tuple[float, float]:
+    """(N, m): within which the force of a straight press of this depth stays, at 95 % of places, for that
+    some are not solved: at each of the first places against what the others alone tell of it.
+
+    Farther from its neighbours than any place between them, one that is left out says more than the error.
+    """
+    first = compliance.first
+    points, normals = compliance.own_points[first], compliance.own_normals[first]
+    tip, depth = model.tool.tip_radius_m, COARSE_DEPTH * model.tool.tip_radius_m
+    curvature = principal_curvatures(model.mesh, points, normals, tip).mean(axis=1)
+    law = rendered_touch(model, options).law_of_dent(model.material.poisson_ratio)
+    steps = np.linspace(0.0, depth, _STEPS)
+    path = (-steps[None, :, None] * normals[:, None]).reshape(-1, 3)
+    solved, told = (
+        touch_forces(
+            path,
+            _STEPS * np.arange(len(first) + 1),
+            TouchedPlaces(normals, far, curvature),
+            young_modulus_pa=model.material.young_modulus_pa,
+            poisson_ratio=model.material.poisson_ratio,
+            tip_radius_m=tip,
+            law=law,
+        )[_STEPS - 1 :: _STEPS]
+        for far in compliance.left_out()
+    )
+    return float(np.quantile(np.linalg.norm(told - solved, axis=1), 0.95)), depth
 
 
 def place_numbers(

@@ -24,7 +24,6 @@ from palpate.render.base import Renderer
 from palpate.render.force_error import error_figures, force_errors
 from palpate.render.scene import TouchScene, scene_of
 from palpate.render.surface.bvh import STACK, closest_triangle
-from palpate.render.surface.contact import CLEAR, outside
 from palpate.render.surface.contact_surface import SurfaceArrays
 from palpate.render.surface.walking import foot
 
@@ -199,14 +198,10 @@ def check_start(scene: TouchScene, start: np.ndarray, touch: np.ndarray, radius:
 
     touch: (3,) m, the centre at first touch. A tip that starts beside the foot may graze the support.
     """
-    surface, plane = scene.renderer.contact.arrays, scene.support
-    weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
-    triangle, distance = closest_triangle(
-        surface.bvh, surface.vertices, surface.triangles, start, np.inf, weights, stack
-    )
+    plane = scene.support
     there = f"the press would start at {np.round(start, 6).tolist()} m, "
     meets = f"along this direction its centre is at {np.round(touch, 6).tolist()} m as it meets the surface: "
-    if distance <= radius + CLEAR or not outside(surface, triangle, weights, start):
+    if not scene.is_free(start, radius):
         raise OptionError(
             f"{there}where a tip of radius {radius:g} m is in the object; {meets}approach through less free "
             "air (--approach), or press from another side"

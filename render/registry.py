@@ -56,11 +56,12 @@ def create(
     progress: Progress = silent,
     *,
     on_demand: bool = False,
+    coarse: bool = False,
 ) -> Renderer:
     """The renderer of that name for a model; raises OptionError for a name that is not there.
 
     on_demand: for one tip's path, headless: our finite-element renderer solves only the places that it comes
-    to.
+    to. coarse: for a free hand at once; it renders what is kept of the compliance (render.fem.renderer).
     """
     known = {**RENDERERS, **_SIMULATORS}
     if name not in known:
@@ -68,4 +69,6 @@ def create(
     module = importlib.import_module(known[name])
     if on_demand and hasattr(module, "create_on_demand"):
         return module.create_on_demand(model, options or RenderOptions(), progress)
+    if coarse and hasattr(module, "create_coarse"):
+        return module.create_coarse(model, options or RenderOptions(), progress)
     return module.create(name, model, options or RenderOptions(), progress)

@@ -38,22 +38,26 @@ def replay(
     tip_radius_m: float | None = None,
     progress: Progress = silent,
     unsettled: Callable[[int], None] | None = None,
+    checked: bool = True,
 ) -> np.ndarray:
     """Force on the tool (n, 3) N for a path of one tip: t (n,) s increasing, positions (n, 3) m of its
     centre.
 
-    touched: a scene, or a renderer, which stands on its model's support. The tip starts in air: one that
-    begins inside the object is not touched until it has come out. tip_radius_m: None takes the model's.
-    unsettled: told how many samples' force did not settle, and hold the one before. Bit-identical from run to
-    run. Raises OptionError where the shapes disagree.
+    touched: a scene, or a renderer, which stands on its model's support. tip_radius_m: None takes the
+    model's. unsettled: told how many samples' force did not settle, and hold the one before. Bit-identical
+    from run to run. Raises OptionError where the shapes disagree, and, if checked, where the path starts in
+    the object: a tip that does feels nothing until it has come out.
     """
     scene = scene_of(touched)
     t = np.ascontiguousarray(t, dtype=float)
     positions = np.array(positions, dtype=float)
     if t.ndim != 1 or positions.shape != (len(t), 3):
         raise OptionError(f"a path needs t (n,) and positions (n, 3); got {t.shape} and {positions.shape}")
+    radius = scene.model.tool.tip_radius_m if tip_radius_m is None else tip_radius_m
+    if checked:
+        check_path(scene, t, positions, radius)
     forces = np.zeros_like(positions)
-    state = scene.start(None if tip_radius_m is None else [tip_radius_m])
+    state = scene.start([radius])
     steps = np.diff(t, prepend=t[0] - 1e-3) if len(t) else t
     for first in range(0, len(t), _CHUNK):
         part = slice(first, first + _CHUNK)
@@ -69,10 +73,32 @@ def replay_recording(
     recording: Recording,
     progress: Progress = silent,
     unsettled: Callable[[int], None] | None = None,
+    *,
+    checked: bool = True,
 ) -> np.ndarray:
     """`replay` of a recording's path with the recording's tip."""
     path, radius = recording.position, recording.tip_radius_m
-    return replay(touched, recording.t, path, tip_radius_m=radius, progress=progress, unsettled=unsettled)
+    return replay(
+        touched, recording.t, path, tip_radius_m=radius, progress=progress, unsettled=unsettled,
+        checked=checked,
+    )  # fmt: skip
+
+
+def check_path(scene: TouchScene, t: np.ndarray, positions: np.ndarray, radius_m: float) -> None:
+    """Raise OptionError where the path (n, 3) m of a tip's centre starts in the object."""
+    read = np.flatnonzero(np.isfinite(positions).all(axis=1))
+    if not len(read) or scene.is_free(positions[read[0]], radius_m):
+        return
+    out = next((k for k in read if scene.is_free(positions[k], radius_m)), None)
+    cure = (
+        "and never leaves it: are path and model in one frame, and both in metres?"
+        if out is None
+        else f"where no press is felt: it is free at t = {t[out]:.6g} s, cut the rows before"
+    )
+    raise OptionError(
+        f"the path starts at {np.round(positions[read[0]], 6).tolist()} m (t = {t[read[0]]:.6g} s), where a "
+        f"tip of radius {radius_m:g} m is in the object, {cure}"
+    )
 
 
 def replay_touches(

@@ -21,6 +21,8 @@ from palpate.render.support import (
     no_support,
     support_plane,
 )
+from palpate.render.surface.bvh import STACK, closest_triangle
+from palpate.render.surface.contact import CLEAR, outside
 
 
 class SceneState(NamedTuple):
@@ -52,6 +54,15 @@ class TouchScene:
         touch = self.renderer.start(radii_m, dt_s)
         shape = touch.forces.shape
         return SceneState(touch, np.zeros(shape), np.full(shape, np.nan), np.zeros(shape))
+
+    def is_free(self, centre: np.ndarray, radius_m: float) -> bool:
+        """Whether a tip whose centre is at (3,) m is off the object: only such a one is felt later."""
+        surface = self.renderer.contact.arrays
+        weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
+        triangle, distance = closest_triangle(
+            surface.bvh, surface.vertices, surface.triangles, centre, np.inf, weights, stack
+        )
+        return bool(distance > radius_m + CLEAR and outside(surface, triangle, weights, centre))
 
     def step(self, state: SceneState, tips: np.ndarray) -> tuple[SceneState, np.ndarray]:
         """Advance by one tick: `Renderer.step`, and the support. Returns the state and its forces (m, 3) N.

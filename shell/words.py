@@ -96,6 +96,14 @@ def unsettled_words(unsettled: int, of: int) -> str:
     return f"{unsettled} of {counted(of, 'force')} did not settle: the one before was held"
 
 
+def table_words(solved: float, error_n: float, depth_m: float) -> str:
+    """How far a table is that is filled in while it is felt, and what it may be off by."""
+    words = f"coarse table: {percent(solved)} of the places are solved"
+    if error_n != error_n:
+        return words
+    return f"{words}; a press of {mm(depth_m)} is within {1e3 * error_n:.2g} mN (95 % of places)"
+
+
 def with_unit(value: float, unit: str, scale: float = 1.0, digits: int = 4) -> str:
     """A number with its unit for people: `with_unit(0.0123, "mm", 1e3)` is '12.3 mm'."""
     return f"{value * scale:.{digits}g} {unit}"

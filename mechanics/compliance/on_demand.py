@@ -27,6 +27,7 @@ from palpate.mechanics.compliance.sites import patch_width
 from palpate.mechanics.disk.store import read_arrays, write_arrays
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import CacheError
+from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import closest
 from palpate.mechanics.shape.tetmesh import TetMesh
 
@@ -75,11 +76,21 @@ class OnDemandCompliance:
         met = np.unique(triangle)
         new = np.array([t for t in met if t not in self._middles], dtype=np.int64)
         if len(new):
-            self._solve(np.unique(np.concatenate([self._edges.corners(t) for t in new])))
+            self.solve(np.unique(np.concatenate([self._edges.corners(t) for t in new])))
             self._middles.update(zip(new.tolist(), self._edges(self.own, new), strict=True))
         middles = np.array([self._middles[t] for t in met])[np.searchsorted(met, triangle)]
         own = interpolated(self.own[self.own_triangles[triangle]], middles, weights)
         return less_half_space(own, normals, float(self.poisson_ratio[0]), float(self.own_width_m[0]))
+
+    @property
+    def is_solved(self) -> np.ndarray:
+        """(v,) bool, the corners that are."""
+        return ~np.isnan(self.own[:, 0, 0])
+
+    def ready(self) -> np.ndarray:
+        """(g,) bool, the triangles of which `far_at` has nothing to solve."""
+        solved = self.is_solved
+        return np.array([bool(solved[corners].all()) for corners in self._around])
 
     def displacement(self, corner: int, force: np.ndarray) -> np.ndarray:
         """(t, 3) m Pa: motion of all corners for a force (3,) N on the object at one, times the modulus."""
@@ -99,18 +110,23 @@ class OnDemandCompliance:
         return EdgeMiddles(self.own_points, self.own_triangles)
 
     @cached_property
+    def _around(self) -> list[np.ndarray]:
+        """The corners whose values count for each triangle."""
+        return [self._edges.corners(t) for t in range(len(self.own_triangles))]
+
+    @cached_property
     def _between(self) -> tuple[Solver, sp.csr_matrix]:
         """The mesh's own solver and the patches (t, n) of its corners."""
         solver = self._make_coarse()
         sampler = PatchSampler(solver.mesh, patch_width(solver.mesh))
         return solver, sampler.matrix(solver.mesh.points[self.nodes])
 
-    def _solve(self, corners: np.ndarray) -> None:
+    def solve(self, corners: np.ndarray, progress: Progress = silent) -> None:
         """Solve those of the corners that are not solved yet, and keep them."""
         new = corners[np.isnan(self.own[corners, 0, 0])]
         if not len(new):
             return
-        self.own[new] = self._fine.own(new)
+        self.own[new] = self._fine.own(new, progress)
         kept = self._kept()
         if kept:  # what another process added meanwhile
             more = np.isnan(self.own[:, 0, 0]) & ~np.isnan(kept["own"][:, 0, 0])

@@ -9,9 +9,11 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
+from palpate.mechanics.compliance.coarse_table import CoarseCompliance, first_places
 from palpate.mechanics.compliance.fine_corners import fine_corners, is_loose
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
@@ -105,6 +107,7 @@ def load_or_condense(
             hold=hold,
             low_rank_error=error,
             tip_radius_m=model.tool.tip_radius_m,
+            solved=kept_places(model),
             progress=progress,
         )
         return made.arrays()
@@ -126,23 +129,61 @@ def load_or_solve(model: Model, progress: Progress = silent) -> SurfaceComplianc
     A base that is loose in part is condensed: which of its places rest on the floor is found from place to
     place over the whole surface.
     """
-    hold = _hold(model)
     condensed = _condensed(model)
     if condensed is not None:
         return condensed
-    if is_loose(hold):
+    if is_loose(_hold(model)):
         return load_or_condense(model, progress)
+    return _on_demand(model)
+
+
+def fills(model: Model) -> bool:
+    """Whether there is something to solve, and places can be solved one by one."""
+    return not is_loose(_hold(model)) and _condensed(model) is None
+
+
+def load_coarse(model: Model) -> SurfaceCompliance | CoarseCompliance | None:
+    """The compliance of a model from what is kept of it: condensed, or the places that are solved and what
+    they tell of the others; None where the first places are not all solved."""
+    condensed = _condensed(model)
+    if condensed is not None:
+        return condensed
+    kept = kept_places(model)
+    if kept is None or not kept.is_solved[first_places(kept.own_points)].all():
+        return None
+    return CoarseCompliance(kept)
+
+
+def kept_places(model: Model) -> OnDemandCompliance | None:
+    """Of a model whose folder keeps places that were solved; None for others."""
+    key, path = _places_of(model)
+    if path is None or is_loose(_hold(model)):
+        return None
+    try:
+        read_arrays(path, key)
+    except CacheError:
+        return None
+    return _on_demand(model)
+
+
+def _places_of(model: Model) -> tuple[str, Path | None]:
+    key = content_key("solved places 1", compliance_key(model, ComplianceOptions("dense")))
+    return key, None if model.path is None else model.path / f"places-{key[:16]}.bin"
+
+
+def _on_demand(model: Model) -> OnDemandCompliance:
+    hold = _hold(model)
     mesh, nu, ratio = model.mesh, model.material.poisson_ratio, model.ratio_without_balls
     balls = tuple(model.material.inclusions.values())
     tip = model.tool.tip_radius_m
-    key = content_key("solved places 1", compliance_key(model, ComplianceOptions("dense")))
+    key, path = _places_of(model)
     return OnDemandCompliance(
         mesh,
         nu,
         partial(fine_corners, mesh, nu, ratio, balls=balls, hold=hold, tip_radius_m=tip),
         lambda: Solver(mesh.quadratic(), nu, with_balls(mesh, ratio, balls) if balls else ratio, hold=hold),
         key,
-        None if model.path is None else model.path / f"places-{key[:16]}.bin",
+        path,
     )
 
 

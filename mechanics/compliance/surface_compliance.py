@@ -24,6 +24,7 @@ from palpate.mechanics.compliance.fine_corners import (
     less_half_space,
     normals_of,
 )
+from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.compliance.sites import patch_width
 from palpate.mechanics.elastic.held_base import BaseHold
@@ -112,6 +113,7 @@ def surface_compliance(
     hold: BaseHold | None = None,
     low_rank_error: float | None = None,
     tip_radius_m: float = USUAL_TIP_RADIUS_M,
+    solved: OnDemandCompliance | None = None,
     progress: Progress = silent,
 ) -> SurfaceCompliance:
     """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None, without the balls;
@@ -119,7 +121,8 @@ def surface_compliance(
 
     low_rank_error: None for dense blocks; else the relative error to which a factor stands in for them, under
     a patch of at least WIDE_PATCH_M. tip_radius_m: only matters where a ball lies close below the surface
-    (mechanics.compliance.near_field).
+    (mechanics.compliance.near_field). solved: of the same object, where some places are solved already: the
+    rest is added to it.
     """
     # between places a loose base rests on the floor: never softer than what each place has of its own
     resting = None if hold is None else replace(hold, resting=True)
@@ -136,12 +139,21 @@ def surface_compliance(
         width = max(width, WIDE_PATCH_M)
         blocks = np.zeros((0, 0, 3, 3), dtype=np.float32)
         tables["factor"] = compress(coarse, points, width, tolerance=low_rank_error, progress=progress).factor
-    serves = coarse if is_fine(mesh, balls, hold) else None
+    serves = coarse if solved is None and is_fine(mesh, balls, hold) else None
     del coarse
-    fine = fine_corners(
-        mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold, tip_radius_m=tip_radius_m, solver=serves
-    )
-    own = fine.own(progress=progress)
+    if solved is None:
+        fine = fine_corners(
+            mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold, tip_radius_m=tip_radius_m,
+            solver=serves,
+        )  # fmt: skip
+        own, own_width = fine.own(progress=progress), np.array([fine.width_m])
+        own_points, own_normals, own_triangles = fine.points, fine.normals, fine.triangles
+    else:
+        solved.solve(np.arange(len(solved.own)), progress)
+        own, own_width = np.array(solved.own), np.array(solved.own_width_m)
+        own_points, own_normals, own_triangles = (
+            np.array(each) for each in (solved.own_points, solved.own_normals, solved.own_triangles)
+        )
     progress("compliance of each place", 1.0)
     return SurfaceCompliance(
         nodes=nodes,
@@ -150,11 +162,11 @@ def surface_compliance(
         triangles=triangles,
         blocks=blocks,
         patch_width_m=np.array([width]),
-        own_points=fine.points,
-        own_normals=fine.normals,
-        own_triangles=fine.triangles,
+        own_points=own_points,
+        own_normals=own_normals,
+        own_triangles=own_triangles,
         own=own,
-        own_width_m=np.array([fine.width_m]),
+        own_width_m=own_width,
         poisson_ratio=np.array([float(poisson_ratio)]),
         **tables,
     )

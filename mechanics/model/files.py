@@ -10,7 +10,8 @@ MODEL/palpations.csv   one row a palpation, for people
 MODEL/surface.vtp      what a tip meets, written by the shell (render.surface.felt_surface), keyed by content
 MODEL/compliance-*.bin the cached compliance (mechanics.compliance.stored_compliance), keyed by content
 MODEL/places-*.bin     that of single places (mechanics.compliance.on_demand), added to
-MODEL/contact-*.bin    the contact surface (render.surface.snapping), keyed by content"""
+MODEL/contact-*.bin    the contact surface (render.surface.snapping), keyed by content
+MODEL/curvature-*.bin  its curvatures (render.fem.fine_surface), keyed by content"""
 
 from __future__ import annotations
 
@@ -99,6 +100,7 @@ MODEL = FolderKind(
         "compliance-*.bin",
         "places-*.bin",
         "contact-*.bin",
+        "curvature-*.bin",
     ),
 )
 """What `write_model` writes, and what is kept beside it later."""

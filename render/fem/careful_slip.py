@@ -37,7 +37,7 @@ def settle(p, state, i):
     turn_frame(state.frames[i], state.normals[i])
     frame, local, young = state.frames[i], state.local_far[i], p.young_modulus_pa[0]
     curvature = bracing = softness = 0.0
-    turned = state.vectors
+    turned, before = state.vectors, state.before[0]
     for r in range(3):
         for c in range(3):
             local[r, c] = 0.0
@@ -52,6 +52,13 @@ def settle(p, state, i):
         for r in range(3):
             for c in range(3):
                 local[r, c] += w * p.far[v, r, c]
+        if before > 0.0:
+            for r in range(3):
+                for c in range(3):
+                    local[r, c] += w * before * (p.far_before[v, r, c] - p.far[v, r, c])
+    series = p.series_compliance[0]
+    if before > 0.0:
+        series += before * (p.series_before[0] - series)
     for r in range(3):
         for c in range(3):
             total = 0.0
@@ -64,7 +71,7 @@ def settle(p, state, i):
             for k in range(3):
                 total += frame[r, k] * turned[k, c]
             local[r, c] = total
-        local[r, r] += p.series_compliance[0]
+        local[r, r] += series
     radius = state.radii_m[i] * p.effects.dent_radius[0]
     state.radius[i] = 1.0 / max(1.0 / radius + curvature, 0.25 / radius)
     state.curvature[i] = curvature

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from palpate.mechanics.compliance.coarse_table import CoarseCompliance
 from palpate.mechanics.compliance.near_field import surface_softness
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import principal_curvatures
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.model.model import Model
+from palpate.render.options import RenderOptions
 from palpate.render.surface.contact_surface import ContactSurface
+from palpate.render.surface.snapping import touched_surface
+
+Compliance = SurfaceCompliance | OnDemandCompliance | CoarseCompliance
 
 
 class FineSurface:
@@ -28,15 +34,13 @@ class FineSurface:
     the half-space that the compliance takes off is of the wrong modulus, and the difference is given back.
     """
 
-    def __init__(
-        self, model: Model, surface: ContactSurface, compliance: SurfaceCompliance | OnDemandCompliance
-    ) -> None:
+    def __init__(self, model: Model, surface: ContactSurface, compliance: Compliance) -> None:
         arrays, mesh, nu = surface.arrays, model.mesh, model.material.poisson_ratio
         number = np.full(int(max(surface.parents.max(), compliance.nodes.max())) + 1, -1, dtype=np.int64)
         number[compliance.nodes] = np.arange(len(compliance.nodes))
         self.parents = np.ascontiguousarray(number[surface.parents])
         self._model, self._vertices, self._normals = model, arrays.vertices, arrays.normals
-        touched = np.unique(arrays.triangles[arrays.free > 0])
+        self._touched = touched = np.unique(arrays.triangles[arrays.free > 0])
         points, normals = arrays.vertices[touched], arrays.normals[touched]
         v, tip = len(arrays.vertices), model.tool.tip_radius_m
         self.far, self._added = np.zeros((v, 3, 3)), np.zeros((v, 3, 3))
@@ -50,13 +54,13 @@ class FineSurface:
         for k in touched[self.softness[touched] != 1]:
             self._added[k] += (1 - self.softness[k]) * half_space_compliance(arrays.normals[k], nu, width)
         if mesh.shape is None:  # all are fitted at once: each is the same only among the same
-            bent = principal_curvatures(mesh, points, normals, tip).mean(axis=1)
+            bent = _curvature(model, points, normals)
             self.curvature[touched] = bent + missed.curvature
         self.far[touched] = np.nan
         if not isinstance(compliance, OnDemandCompliance):
             self.solve(compliance, touched)
 
-    def solve(self, compliance: SurfaceCompliance | OnDemandCompliance, vertices: np.ndarray) -> None:
+    def solve(self, compliance: Compliance, vertices: np.ndarray) -> None:
         """Write what is not known yet at some vertices (k,)."""
         new = vertices[np.isnan(self.far[vertices, 0, 0])]
         if not len(new):
@@ -64,9 +68,41 @@ class FineSurface:
         points, normals = self._vertices[new], self._normals[new]
         model = self._model
         if model.mesh.shape is not None:
-            bent = principal_curvatures(model.mesh, points, normals, model.tool.tip_radius_m).mean(axis=1)
+            whole = len(new) == len(self._touched)
+            bent = kept_curvature(model, points, normals) if whole else _curvature(model, points, normals)
             self.curvature[new] = bent + self._rims[new]
         far = compliance.far_at(points, normals) + self._added[new]
         if not np.isfinite(far).all():
             raise MeshError("the compliance is not known all over the surface: solve it anew")
         self.far[new] = far
+
+    def far_of(self, compliance: Compliance) -> np.ndarray:
+        """(v, 3, 3) 1/m, the far field by another compliance of the same object."""
+        far = np.zeros_like(self.far)
+        at = self._touched
+        far[at] = compliance.far_at(self._vertices[at], self._normals[at]) + self._added[at]
+        return far
+
+
+def keep_surface(model: Model, options: RenderOptions) -> None:
+    """Make what a renderer needs beside the compliance, so that it lies in the model's folder."""
+    surface = touched_surface(model, options)
+    if model.mesh.shape is not None:
+        arrays = surface.arrays
+        touched = np.unique(arrays.triangles[arrays.free > 0])
+        kept_curvature(model, arrays.vertices[touched], arrays.normals[touched])
+
+
+def kept_curvature(model: Model, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(k,) 1/m, mean of the principal curvatures of a known shape at all of a surface's places (k, 3), from
+    the model's folder where it is kept."""
+    shape = model.mesh.shape
+    if model.path is None or shape is None:
+        return _curvature(model, points, normals)
+    key = content_key("curvature 1", shape.key, points, normals, float(model.tool.tip_radius_m))
+    path = model.path / f"curvature-{key[:16]}.bin"
+    return load_or_build(path, key, lambda: {"mean": _curvature(model, points, normals)})["mean"]
+
+
+def _curvature(model: Model, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    return principal_curvatures(model.mesh, points, normals, model.tool.tip_radius_m).mean(axis=1)

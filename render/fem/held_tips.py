@@ -48,6 +48,8 @@ def new_frame(frame, normal):
 
 
 NOWHERE = -2
+BLEND_S = 0.05
+"""In which a touch that goes on comes from one table to the next: no hand feels it jump."""
 
 
 @part
@@ -82,9 +84,13 @@ def leave(state, i):
 
 @part
 def renew(p, state):
-    """Where the table was exchanged under a running state, every place counts as new."""
+    """Where the table was exchanged under a running state, every place counts as new, and the far field of
+    before gives way to the new one within BLEND_S."""
+    if state.before[0] > 0.0:
+        state.before[0] = max(state.before[0] - state.dt_s[0] / BLEND_S, 0.0)
     if state.edition[0] != p.edition[0]:
         state.edition[0] = p.edition[0]
+        state.before[0] = 1.0
         for i in range(state.nodes.shape[0]):
             state.nodes[i, 0] = NOWHERE
 

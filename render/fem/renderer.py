@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.compliance.coarse_table import CoarseCompliance
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
-from palpate.mechanics.compliance.stored_compliance import load_or_condense, load_or_solve
+from palpate.mechanics.compliance.stored_compliance import load_coarse, load_or_condense, load_or_solve
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
 from palpate.render.base import Renderer, check_radii
 from palpate.render.effects import effect_arrays, rendered_touch
-from palpate.render.fem.fine_surface import FineSurface
+from palpate.render.fem.fine_surface import Compliance, FineSurface
 from palpate.render.fem.kernel import fem_step
 from palpate.render.fem.state import FemParameters, FemState, new_fem_state
 from palpate.render.options import RenderOptions
@@ -32,6 +33,7 @@ class FemRenderer(Renderer):
 
     With an OnDemandCompliance the far field is known only where a tip has come: `step` and `follow` find what
     is missing, solve it, and go the same ticks again. A kernel that is run by itself needs `condensed()`.
+    With a CoarseCompliance every place is felt at once, by what the solved ones tell (`coarse`).
     """
 
     name = NAME
@@ -42,7 +44,7 @@ class FemRenderer(Renderer):
         model: Model,
         options: RenderOptions | None = None,
         *,
-        compliance: SurfaceCompliance | OnDemandCompliance | None = None,
+        compliance: Compliance | None = None,
         progress: Progress = silent,
     ) -> None:
         self.model = model
@@ -57,6 +59,7 @@ class FemRenderer(Renderer):
         self.parameters = FemParameters(
             surface=self.contact.arrays,
             far=field.far,
+            far_before=field.far,
             curvature=field.curvature,
             bracing=field.bracing,
             softness=field.softness,
@@ -69,6 +72,7 @@ class FemRenderer(Renderer):
             poisson_ratio=np.array([model.material.poisson_ratio]),
             friction=np.array([touch.friction]),
             series_compliance=np.zeros(1),
+            series_before=np.zeros(1),
             edition=np.zeros(1, dtype=np.int64),
             effects=effect_arrays(touch),
         )
@@ -108,12 +112,23 @@ class FemRenderer(Renderer):
     def condensed(self) -> FemRenderer:
         """This renderer with every place, and what lies between them: for several tips, and for a free
         hand."""
-        if isinstance(self.compliance, OnDemandCompliance):
-            self.compliance = load_or_condense(self.model)
+        if not isinstance(self.compliance, SurfaceCompliance):
+            coarse, self.compliance = self.coarse, load_or_condense(self.model)
             blocks, factor = np.array(self.compliance.blocks), np.array(self.compliance.factor)
             self.parameters = self.parameters._replace(blocks=blocks, factor=factor)
+            if coarse:
+                self.parameters = self.parameters._replace(far=self.far_of(self.compliance))
             self.far_at(slice(None))
         return self
+
+    @property
+    def coarse(self) -> bool:
+        """Whether what it renders is what solved places tell of the others."""
+        return isinstance(self.compliance, CoarseCompliance)
+
+    def far_of(self, compliance: Compliance) -> np.ndarray:
+        """(v, 3, 3) 1/m, the far field by another compliance of the same object, for `with_field`."""
+        return self._fine.far_of(compliance)
 
     @property
     def whole_compliance(self) -> SurfaceCompliance:
@@ -139,15 +154,23 @@ class FemRenderer(Renderer):
     def with_field(self, far: np.ndarray, blocks: np.ndarray | None = None) -> FemRenderer:
         """The same renderer with another far field (v, 3, 3), mutual table (t, t, 3, 3), 1/m, unit modulus.
 
-        For an object that changes inside while it is touched. blocks: None keeps the table.
+        For an object that changes inside, or is known better, while it is touched: a state that goes on comes
+        to it within held_tips.BLEND_S. blocks: None keeps the table.
         """
-        self.condensed()
+        if not self.coarse:
+            self.condensed()
         if far.shape != self.parameters.far.shape or (
             blocks is not None and blocks.shape != self.parameters.blocks.shape
         ):
             raise OptionError("a changed field must have the shape of the renderer's own")
         # the compiled loop knows only arrays in C order that may be written to
-        changed = self._with(far=np.array(far, order="C"), edition=self.parameters.edition + 1)
+        given = self.parameters
+        changed = self._with(
+            far=np.array(far, order="C"),
+            far_before=given.far,
+            series_before=given.series_compliance,
+            edition=given.edition + 1,
+        )
         if blocks is not None:
             table = np.array(blocks, dtype=np.float32, order="C")
             changed.parameters = changed.parameters._replace(blocks=table)
@@ -177,6 +200,12 @@ def create(name: str, model: Model, options: RenderOptions, progress: Progress =
 def create_on_demand(model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
     """One that solves the places that a tip comes to, unless all are known: headless, for one tip."""
     return FemRenderer(model, options, compliance=load_or_solve(model, progress))
+
+
+def create_coarse(model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
+    """One that renders at once what is kept of a model's compliance, its first places at least; condensed
+    where that is not there."""
+    return FemRenderer(model, options, compliance=load_coarse(model), progress=progress)
 
 
 def _arrays(state: Any) -> list[np.ndarray]:

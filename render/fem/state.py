@@ -17,16 +17,18 @@ from palpate.render.surface.contact_surface import SurfaceArrays
 class FemParameters(NamedTuple):
     """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
 
-    far: (v, 3, 3) 1/m, NaN where it is not solved. curvature: (v,) 1/m, mean of the principal ones. bracing:
-    (v,) 1/m (Field). softness: (v,) of the material under a tip, 1 where its modulus is the global one.
-    parents: (k, 3) compliance nodes that interpolate over a triangle, -1 where fixed; parent_weights (k, 3,
-    3). blocks: (n, n, 3, 3) 1/m, or of no size and factor: (n, 3, r) in their place, see SurfaceCompliance.
-    table: dent law. young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each. edition:
-    (1,) int64, that of the table.
+    far: (v, 3, 3) 1/m, NaN where it is not solved; far_before, series_before: what a state that goes on from
+    the edition before leaves gradually (render.fem.kernel). curvature: (v,) 1/m, mean of the principal ones.
+    bracing: (v,) 1/m (Field). softness: (v,) of the material under a tip, 1 where its modulus is the global
+    one. parents: (k, 3) compliance nodes that interpolate over a triangle, -1 where fixed; parent_weights (k,
+    3, 3). blocks: (n, n, 3, 3) 1/m, or of no size and factor: (n, 3, r) in their place, see
+    SurfaceCompliance. table: dent law. young_modulus_pa, poisson_ratio, friction, series_compliance (m/N):
+    (1,) each. edition: (1,) int64, that of the table.
     """
 
     surface: SurfaceArrays
     far: np.ndarray
+    far_before: np.ndarray
     curvature: np.ndarray
     bracing: np.ndarray
     softness: np.ndarray
@@ -39,6 +41,7 @@ class FemParameters(NamedTuple):
     poisson_ratio: np.ndarray
     friction: np.ndarray
     series_compliance: np.ndarray
+    series_before: np.ndarray
     edition: np.ndarray
     effects: EffectArrays
 
@@ -49,15 +52,15 @@ class FemState(NamedTuple):
     grip: where each tip is held. frames: (m, 3, 3) rows n, u, v. elastic: (m, 3) N, quasi-static forces on
     the tools. memory: (m, STATE_SIZE) of the sticks. remembered: (m, laws, k) by the laws along each touch's
     path (`laws_along_path`). young: (m,) Pa under each tip. deepest: (m,) m of this touch. felt: (v,)
-    greatest load of each fine vertex.
-    Between contacts (render.fem.held_tips): nodes (m, 3), node_weights (m, 3) interpolate at each tip; moved
-    (m, 2) whether nodes or weights changed this tick; corners (m, m, 9, 9) 1/m, blocks of the corners of
-    pairs j < i; mixed (m, 3, r) the factor at each tip; links (m, 3, 3, m) m/N, [j, c, k, i] the displacement
-    of tip i's place along k for a unit force on the object at tip j along c; carried (3, m) m, by how
-    much the others move each place, with the sign turned, and carried_before that of its last
-    solution; edition of the table; held (m,) int64, 1 where a tip's force did not settle in this tick;
-    unsolved (v,) int8, 1 where the far field of a fine vertex was wanted that is not solved: it was taken for
-    zero, and no force is right from then on. The others are scratch.
+    greatest load of each fine vertex. Between contacts (render.fem.held_tips): nodes (m, 3), node_weights (m,
+    3) interpolate at each tip; moved (m, 2) whether nodes or weights changed this tick; corners (m, m, 9, 9)
+    1/m, blocks of the corners of pairs j < i; mixed (m, 3, r) the factor at each tip; links (m, 3, 3, m) m/N,
+    [j, c, k, i] the displacement of tip i's place along k for a unit force on the object at tip j along c;
+    carried (3, m) m, by how much the others move each place, with the sign turned, and carried_before that of
+    its last solution; edition of the table, and before (1,), the share of the one before that is still felt;
+    held (m,) int64, 1 where a tip's force did not settle in this tick; unsolved (v,) int8, 1 where the far
+    field of a fine vertex was wanted that is not solved: it was taken for zero, and no force is right from
+    then on. The others are scratch.
     """
 
     forces: np.ndarray
@@ -85,6 +88,7 @@ class FemState(NamedTuple):
     carried: np.ndarray
     carried_before: np.ndarray
     edition: np.ndarray
+    before: np.ndarray
     solution: np.ndarray
     flat: np.ndarray
     local_far: np.ndarray
@@ -124,6 +128,7 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         carried=np.zeros((3, m)),
         carried_before=np.zeros((3, m)),
         edition=parameters.edition.copy(),
+        before=np.zeros(1),
         solution=np.zeros((m, 8)),
         flat=np.zeros(9),
         local_far=np.zeros((m, 3, 3)),

@@ -18,8 +18,8 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
-from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.sites import TouchSites
+from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.disk.toml_text import plain
@@ -108,7 +108,7 @@ def with_own_stiffness(renderer: Renderer) -> FeltSurface:
     surface = felt_surface(renderer.model)
     if not isinstance(renderer, FemRenderer) or surface.stiffness_from == PRESSES:
         return surface
-    if isinstance(renderer.compliance, OnDemandCompliance):
+    if not isinstance(renderer.compliance, SurfaceCompliance):
         return surface
     plain = RenderOptions()
     if replace(renderer.options, friction=plain.friction) != plain:
@@ -167,7 +167,7 @@ def _shape_key(model: Model) -> str:
         mesh.points,
         mesh.tetrahedra,
         mesh.fixed,
-        "" if mesh.shape is None else f"sharp rims {mesh.shape.key}",
+        "" if mesh.shape is None else f"sharp rims, a foot of its side {mesh.shape.key}",
         np.zeros(0) if sd is None else sd,
         np.hstack([model.presses.point, model.presses.normal]),
         float(model.tool.tip_radius_m),

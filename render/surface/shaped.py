@@ -126,6 +126,7 @@ def on_shape(
     rim = np.intersect1d(used, triangles[free == 0])
     edge = float(np.median(np.linalg.norm(vertices[touch[:, 0]] - vertices[touch[:, 1]], axis=1)))
     creased = _on_creases(shape, placed, normals, touch, rim, edge)
+    normals[rim] = _of_side(placed, normals, touch)[rim]
     placed[used] = _lifted(shape, placed, normals, touch, creased)[used]
     creased[rim] = False  # no tip gets under it
     if not creased.any() or edge > 2 * EDGE_ROUNDING_M:
@@ -155,6 +156,20 @@ def on_shape(
     facing = between[cKDTree(placed[rims]).query(placed[own])[1]]
     normals[own] = _towards(normals[own], facing, 1 - away / RIM_STRIP_M)
     return OnShape(placed, normals, triangles, within, weights)
+
+
+def _of_side(placed: np.ndarray, normals: np.ndarray, touch: np.ndarray) -> np.ndarray:
+    """(v, 3) the normals, where they are another face's the mean of the triangles `touch` (k, 3) instead.
+
+    A point of the foot's rim is the base's as well, and what the shape says there may point straight down.
+    """
+    p = placed[touch]
+    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    total = np.zeros_like(placed)
+    np.add.at(total, touch, area[:, None])
+    side = unit_vectors(total, normals)
+    other = np.einsum("vx,vx->v", normals, side) < _CROSSES
+    return np.where(other[:, None], side, normals)
 
 
 def _line(shape: TrueShape, rims: np.ndarray, base: np.ndarray) -> cKDTree:

@@ -46,6 +46,7 @@ from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
 from palpate.render.options import DOCUMENTED
 from palpate.render.registry import check_settings
+from palpate.words import unsettled_words
 
 if TYPE_CHECKING:
     from palpate.diagnosis.other_simulator.pipeline import Asked
@@ -232,6 +233,7 @@ def _applied(own: Diagnosis, into: str) -> list[str]:
     return [
         f"improved model ({', '.join(kept) or 'modulus only'}): {into}",
         f"  replayed over the recording its force is {after} off, the given model's {before}",
+        *([f"  {unsettled_words(found.unsettled, found.samples)}"] if found.unsettled else []),
         *(
             f"  {name.replace('_', ' ')} is left out: with it the replayed force was farther off"
             for name in found.left_out

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from collections.abc import Mapping as Table
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -53,7 +53,8 @@ _NOT_RECORDED = "keep the touch, for reconstruct, compare and diagnose: --record
 
 @dataclass(frozen=True)
 class ServoRun:
-    """What the servo did. failure: what stopped it, '' where nothing did."""
+    """What the servo did. failure: what stopped it, '' where nothing did. table: of the compliance that was
+    felt at the end, keys with units; table_words: the same, '' for the whole one."""
 
     scene: Scene
     device: str
@@ -61,16 +62,20 @@ class ServoRun:
     report: ServoReport
     record: str | Path | None
     failure: str
+    table: Table[str, Any] = field(default_factory=dict)
+    table_words: str = ""
 
     def lines(self) -> list[str]:
         """For a person."""
         recorded = [] if self.record is None else [f"recorded {self.record}"]
         report = self.report.text(sent=spec_of(self.device).has_force)
-        return [f"{self.scene.title}: {self.renderer}, {self.device}", report, *recorded]
+        table = [f"at the end: {self.table_words}; what is solved is kept"] if self.table_words else []
+        return [f"{self.scene.title}: {self.renderer}, {self.device}", report, *table, *recorded]
 
     def as_json(self) -> dict[str, Any]:
         """What the servo did, keys with units."""
-        return {"scene": self.scene.name, "device": self.device, "servo": self.report.as_dict()}
+        servo = self.report.as_dict()
+        return {"scene": self.scene.name, "device": self.device, "table": dict(self.table), "servo": servo}
 
     def exit_code(self) -> int:
         """0; raises DeviceError for what stopped it."""
@@ -225,7 +230,10 @@ class _Opening:
     def touched(self, session: TouchSession, scene: Scene) -> ServoRun:
         """What was done."""
         report, failure = session.report(), session.servo.failure
-        return ServoRun(scene, self.device, session.renderer_name, report, self.record, failure)
+        return ServoRun(
+            scene, self.device, session.renderer_name, report, self.record, failure, session.table.state,
+            session.table.words,
+        )  # fmt: skip
 
 
 def _in_window(

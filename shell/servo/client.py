@@ -36,8 +36,9 @@ class Servo:
     """A servo process as an object; use it in a `with` statement.
 
     model: a Model, a MODEL folder, or a RendererSource. device: a name or a DeviceChoice, made in the servo
-    process, which owns it. mapping: device to scene (devices.mapper), the identity by default. started: a
-    process that waits for its job; None: `start` makes one.
+    process, which owns it. coarse: take what is kept of the model's compliance (palpate.servo.source).
+    mapping: device to scene (devices.mapper), the identity by default. started: a process that waits for its
+    job; None: `start` makes one.
 
     Force lasts only while this side shows that it lives: every call here is a heartbeat, and so is each turn
     of `wait`. After `options.silence_s` without one the force goes off, and ramps in again at the next.
@@ -52,13 +53,14 @@ class Servo:
         options: ServoOptions | None = None,
         mapping: Mapping | None = None,
         render_options: Any = None,
+        coarse: bool = False,
         started: StartedServo | None = None,
     ) -> None:
         self.options = options or ServoOptions()
         self._folder: ModelFolder | None = None
         if isinstance(model, Model | Path | str):
             self._folder = ModelFolder(model)
-            self._source: RendererSource = ModelSource(self._folder.path, renderer, render_options)
+            self._source: RendererSource = ModelSource(self._folder.path, renderer, render_options, coarse)
         else:
             self._source = model
         choice = DeviceChoice(device) if isinstance(device, str) else device
@@ -96,6 +98,13 @@ class Servo:
     def renderer(self) -> str:
         """The name of the renderer that runs."""
         return self._source.name
+
+    @property
+    def folder(self) -> Path:
+        """Of the model that it was made with; raises PalpateError for another source."""
+        if self._folder is None:
+            raise PalpateError("this servo runs no model: start it with one")
+        return self._folder.path
 
     @property
     def tip_radius_m(self) -> float:

@@ -44,6 +44,8 @@ GO = "go"
 STEPS_IN = 30
 """Ticks in which a press that is under way is made again by another renderer."""
 LOOK_S = 0.1
+_BLENDED_S, _LOOK_BLEND_S = 2.0, 5e-3
+"""How long one table is left for the next at most, and how often that is looked at."""
 GRACE_S = 0.7
 
 
@@ -208,6 +210,7 @@ class ServoProcess:
         if name == "modulus":
             self._put(self._coupled(now.scene.renderer.with_modulus(value)))
         elif name == "change":
+            self._until_blended()
             self._put(self._coupled(value.changed(now.scene.renderer)))
         elif name == "friction":
             self._put(now.scene.renderer.with_friction(value))
@@ -222,6 +225,13 @@ class ServoProcess:
             self._pump.set_mapping(value)
         else:
             raise OptionError(f"'{name}' is no command of the servo")
+
+    def _until_blended(self) -> None:
+        """Wait for what runs to have left the table before it: the next takes its place in full."""
+        assert self._loop is not None
+        end = time.perf_counter() + _BLENDED_S
+        while np.any(getattr(self._loop.program.state, "before", 0.0)) and time.perf_counter() < end:
+            time.sleep(_LOOK_BLEND_S)
 
     def _put(self, renderer: Any) -> None:
         """The renderer that runs, retuned: its state and its support stay."""

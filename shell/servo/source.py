@@ -7,10 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
 from palpate.mechanics.disk.scratch import sweep, temporary_prefix
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress
+from palpate.render.fem.renderer import FemRenderer
 
 
 class RendererSource(Protocol):
@@ -26,11 +29,13 @@ class RendererSource(Protocol):
 
 @dataclass(frozen=True)
 class ModelSource:
-    """A renderer by name on a MODEL folder; render_options are the renderer's own, None for defaults."""
+    """A renderer by name on a MODEL folder; render_options are the renderer's own, None for defaults. coarse:
+    it renders at once what is kept of the compliance (render.registry.create)."""
 
     path: Path
     name: str = "fem"
     render_options: Any = None
+    coarse: bool = False
 
     def make(self, progress: Progress) -> tuple[Any, Model | None]:
         """Read the model, load or condense its compliance."""
@@ -38,7 +43,8 @@ class ModelSource:
 
         model = read_model(self.path)
         keywords = {} if self.render_options is None else {"options": self.render_options}
-        return render.create(self.name, model, progress=progress, **keywords), model
+        made = render.create(self.name, model, progress=progress, coarse=self.coarse, **keywords)
+        return made, model
 
     def named(self, name: str, options: Any = None) -> ModelSource:
         """The same model through another renderer; options: None for those of before."""
@@ -51,6 +57,32 @@ class RendererChange(Protocol):
 
     def changed(self, renderer: Any) -> Any:
         """The other renderer."""
+
+
+@dataclass(frozen=True)
+class FieldChange:
+    """The far field (v, 3, 3) of an object that changed, or is known better, and the table between its places
+    where that changed, of no size where not: in a file, for renderers in any process."""
+
+    path: Path
+
+    @classmethod
+    def written(cls, path: Path, far: np.ndarray, blocks: np.ndarray | None = None) -> FieldChange:
+        """To a file; blocks: None where the table between places stays."""
+        with open(path, "wb") as file:
+            np.savez(file, far=far, blocks=np.zeros((0, 0, 3, 3)) if blocks is None else blocks)
+        return cls(path)
+
+    def changed(self, renderer: Any) -> Any:
+        """The renderer on the changed object; one-dimensional ones know nothing of what is inside."""
+        return self.laid_on(renderer) if isinstance(renderer, FemRenderer) else renderer
+
+    def laid_on(self, renderer: FemRenderer) -> FemRenderer:
+        """The renderer on the changed object; one that knows nothing between places has no table to
+        change."""
+        with np.load(self.path) as arrays:
+            table = len(arrays["blocks"]) and len(renderer.parameters.blocks)
+            return renderer.with_field(arrays["far"], arrays["blocks"] if table else None)
 
 
 class ModelFolder:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,22 +29,7 @@ from palpate.render.fem.renderer import FemRenderer
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import ball_of
 from palpate.servo import Servo
-
-
-@dataclass(frozen=True)
-class FieldChange:
-    """The far field and the mutual table of a changed object, in a file, for renderers in any process."""
-
-    path: Path
-
-    def changed(self, renderer: Renderer) -> Renderer:
-        """The renderer on the changed object; one-dimensional ones know nothing of what is inside."""
-        return self.laid_on(renderer) if isinstance(renderer, FemRenderer) else renderer
-
-    def laid_on(self, renderer: FemRenderer) -> FemRenderer:
-        """The renderer on the changed object."""
-        with np.load(self.path) as arrays:
-            return renderer.with_field(arrays["far"], arrays["blocks"] if len(arrays["blocks"]) else None)
+from palpate.servo.source import FieldChange
 
 
 class MovingInclusion:
@@ -78,9 +62,7 @@ class MovingInclusion:
         far, blocks = self._plain_far, self._blocks
         if region is not None:
             far, blocks = self._changed(balls_ratio(self._mesh, [ball_of(region)]), progress)
-        with open(path, "wb") as file:
-            np.savez(file, far=far, blocks=blocks)
-        return FieldChange(path)
+        return FieldChange.written(path, far, blocks)
 
     def _changed(self, ratio: np.ndarray, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
         elements = np.flatnonzero(ratio != 1.0)

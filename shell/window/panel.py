@@ -176,7 +176,8 @@ def _status(window: Shown, frame: Frame) -> list[Row]:
     if session.recording is not None:
         traced = f"base traced {100 * session.recording.traced:.0f} %"
         rows.append((Item(f"Recording {frame.recorded_s or 0.0:.0f} s, {traced}", size=12, colour=WARNING),))
-    said = (window.known_words, frame.reason, window.notice)
+    table = begun(frame.table) if session.feels_inside else ""
+    said = (window.known_words, table, frame.reason, window.notice)
     return [*rows, *((Item(word, size=12, colour=GREY),) for word in said if word)]
 
 

@@ -19,7 +19,6 @@ import numpy as np
 
 from palpate.devices.mapper import Mapping
 from palpate.devices.registry import DeviceChoice, spec_of
-from palpate.mechanics.compliance.stored_compliance import load_or_condense
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
 from palpate.render.base import Renderer
@@ -34,6 +33,7 @@ from palpate.servo.started import StartedServo
 from palpate.window.charts import ForceTrace
 from palpate.window.inclusion import InclusionMover
 from palpate.window.recording import SessionRecording
+from palpate.window.table import SessionTable
 from palpate.window.window_renderers import Beside, DrawnRenderers
 from palpate.window.worker import Frame, RendererView, Worker
 
@@ -93,8 +93,10 @@ class TouchSession:
             mapping=mapping,
             options=asked.servo,
             render_options=asked.render,
+            coarse=True,
             started=started,
         )
+        self.table = SessionTable(self._servo, self._drawn, self.worker, self._follow_drawn)
         self._next = 0
 
     def start(self, progress: Progress = silent, *, compiled: Callable[[], object] = lambda: None) -> Self:
@@ -105,7 +107,7 @@ class TouchSession:
         drawn = ({self._servo.renderer} if self._pictures else set()) | ({self._beside_name} - {""})
         if "fem" in {self._servo.renderer, *drawn}:
             # once, before two processes ask for it at the same time
-            load_or_condense(self.model, lambda stage, share: progress(stage, 0.5 * share))
+            self.table.begin(self.model, lambda stage, share: progress(stage, 0.5 * share))
         with ThreadPoolExecutor(1) as pool:
             loading = [pool.submit(self._drawn.load, name) for name in sorted(drawn)]
             self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share), compiled=compiled)
@@ -119,6 +121,10 @@ class TouchSession:
             self.begin_recording(self._recording_path)
         progress("touching", 1.0)
         return self
+
+    def _follow_drawn(self) -> None:
+        if self._beside is not None:
+            self._beside.change(self._drawn.load(self._beside.name))
 
     def _apply(self) -> None:
         """What the user changed, to a renderer that is new."""
@@ -168,12 +174,13 @@ class TouchSession:
             self.recording.collect()
         beside = self._beside  # the worker may put another in its place
         sizes = np.zeros(len(rows)) if beside is None else beside.follow(rows["tip"])
-        if not self._inclusion.settled:
+        if not self._inclusion.settled and self.table.all_drawn:
             self.worker.offer("computing the ball", self._follow_inclusion)
         snapshot = self._servo.snapshot()
         if snapshot is None:
             return None
         self._add_to_trace(rows, sizes)
+        self.table.follow(snapshot.tips[0])
         felt = snapshot.forces_n.sum(axis=0)
         views = [RendererView(self.renderer_name, felt, self._displacement(snapshot))]
         if beside is not None:
@@ -188,6 +195,7 @@ class TouchSession:
             reason=snapshot.reason if self._has_force else "",
             views=tuple(views),
             busy=self.worker.busy or self.worker.failure,
+            table=self.table.words,
             recorded_s=None if self.recording is None else self.recording.seconds,
         )
 
@@ -231,6 +239,8 @@ class TouchSession:
         if recording is None:
             return None
         rendered: dict[str, Any] = {"renderer": self.renderer_name}
+        if self.feels_inside and self.table.words:
+            rendered["table_at_end"] = self.table.state
         if self.feels_inside:
             rendered["young_modulus_pa"] = self.young_modulus_pa
             rendered["effects"] = sorted(self.model.effects)
@@ -367,6 +377,7 @@ class TouchSession:
         with ExitStack() as rest:  # all of it, from the last, though one fails
             for each in (
                 self._inclusion.close,
+                self.table.close,
                 self._servo.close,
                 self.end_recording,
                 self.worker.wait,

@@ -16,6 +16,7 @@ from palpate.render.options import RenderOptions
 from palpate.render.registry import create
 from palpate.render.scene import TouchScene
 from palpate.render.surface.felt_surface import with_own_stiffness
+from palpate.servo.source import FieldChange
 from palpate.window.inclusion import InclusionMover
 from palpate.window.worker import RendererView
 
@@ -34,7 +35,7 @@ class DrawnRenderers:
 
     def create(self, name: str, progress: Progress = silent) -> Renderer:
         """One as the user has changed it so far, not kept."""
-        made = self._inclusion.laid_on(create(name, self._model, self.options, progress))
+        made = self._inclusion.laid_on(create(name, self._model, self.options, progress, coarse=True))
         changed = self.young_modulus_pa != self._model.material.young_modulus_pa
         return made.with_modulus(self.young_modulus_pa) if changed else made
 
@@ -51,6 +52,16 @@ class DrawnRenderers:
     def put(self, name: str, renderer: Renderer) -> None:
         """Go on with this one under its name."""
         self._made[name] = renderer
+
+    @property
+    def made(self) -> tuple[str, ...]:
+        """The names of those that are loaded."""
+        return tuple(self._made)
+
+    def change(self, change: FieldChange) -> None:
+        """All of them on a changed object."""
+        for name, renderer in list(self._made.items()):
+            self._made[name] = change.changed(renderer)
 
     def know_stiffness(self) -> None:
         """Each place's own, which colours the pictures, where it was kept with the model."""

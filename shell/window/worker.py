@@ -131,7 +131,8 @@ class Frame:
     """Of the first tip: tip_m (3,), depth_m in the object, stiffness in N/m, 0 in air.
 
     reason: why the commanded force is not the rendered one, in plain words. busy: what the worker does, or
-    why it failed. recorded_s: how long a recording runs, None without one.
+    why it failed. recorded_s: how long a recording runs, None without one. table: how far a table is that is
+    filled in while it is felt, '' for the whole one.
     """
 
     time_s: float
@@ -144,3 +145,4 @@ class Frame:
     views: tuple[RendererView, ...]
     busy: str
     recorded_s: float | None
+    table: str = ""

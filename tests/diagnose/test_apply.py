@@ -247,10 +247,11 @@ def test_what_makes_the_replayed_force_worse_is_left_out(bench, model, monkeypat
     replayed = {True: gap_n, False: 0.05}
     monkeypatch.setattr("palpate.diagnosis.apply.with_replayed_modulus", lambda model, recording: model)
     monkeypatch.setattr(
-        "palpate.diagnosis.apply.replayed_gap_n",
-        lambda model, recording: replayed["inclusion" in model.effects],
+        "palpate.diagnosis.apply.replayed_gap",
+        lambda model, recording: (replayed["inclusion" in model.effects], 3),
     )
     found = improvement(model, Named(model, ball), bench.record()[0])
     assert ("inclusion" in found.model.effects) == kept and "friction_slip" in found.model.effects
     assert found.left_out == (() if kept else ("inclusion",))
     assert (found.given_n, found.improved_n) == (0.05, min(gap_n, 0.05))
+    assert found.unsettled == 6 and found.samples > 6

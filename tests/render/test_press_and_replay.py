@@ -156,3 +156,21 @@ def test_a_press_starts_free_or_is_refused(block_renderer):
         with pytest.raises(OptionError, match="meets the surface"):
             check_start(in_the_air(block_renderer), np.array(inside), touch, TIP)
     check_start(in_the_air(block_renderer), np.array([0.067, 0.0, 0.04]), touch, TIP)
+
+
+def test_a_path_that_starts_in_the_object_is_refused_with_the_time_from_which_it_is_free(block_renderer):
+    """Its first press would be felt as nothing."""
+    height = 0.08 + TIP + np.concatenate([np.linspace(-2e-3, 4e-3, 50), np.linspace(4e-3, -2e-3, 50)])
+    path, t = np.outer(height, [0.0, 0.0, 1.0]), 1e-3 * np.arange(100)
+    scene = in_the_air(block_renderer)
+    with pytest.raises(OptionError, match="is free at t = ") as refused:
+        replay(scene, t, path)
+    free = float(str(refused.value).split("t = ")[-1].split(" s")[0])
+    rest = t >= free
+    assert 0.01 < free < 0.05
+    assert np.linalg.norm(replay(scene, t[rest], path[rest])[-1]) > 0.01
+    with pytest.raises(OptionError, match="never leaves"):
+        replay(scene, t[:10], path[:10])
+    # a tip that was not read at first is none that is in the object
+    path[:50] = np.nan
+    assert np.linalg.norm(replay(scene, t, path)[-1]) > 0.01

@@ -192,3 +192,22 @@ def test_a_model_keeps_its_shape(tmp_path):
     assert again.mesh.linear().shape is again.mesh.shape
     plain = dataclasses.replace(made, mesh=dataclasses.replace(made.mesh, shape=None))
     assert read_model(write_model(tmp_path / "M", plain)).mesh.shape is None
+
+
+@pytest.mark.parametrize("outwards", [0.0, -0.3, 0.3])
+def test_the_contact_normal_at_the_rim_of_the_foot_is_that_of_the_side(outwards):
+    """The base meets the side there and looks straight down; a side that hangs over or leans stays."""
+    top = RADIUS * (1 + outwards)
+    shape = turned_on_a_lathe(np.array([[RADIUS, 0.0], [top, HEIGHT]]))
+    mesh = shapes.cylinder(RADIUS, HEIGHT, (6, 5), order=1)
+    points = mesh.points.copy()
+    points[:, :2] *= 1 + outwards * points[:, 2:] / HEIGHT
+    on = mesh.touchable & ~mesh.fixed
+    points[on] = shape.foot(points[on])[0]
+    felt = contact_surface(TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable, shape)).arrays
+    rim = np.intersect1d(felt.triangles[felt.free > 0], felt.triangles[felt.free == 0])
+    assert len(rim) > 60
+    leans = -np.sin(np.arctan2(top - RADIUS, HEIGHT))
+    np.testing.assert_allclose(felt.normals[rim, 2], leans, atol=0.03)
+    radial = felt.vertices[rim, :2] / np.linalg.norm(felt.vertices[rim, :2], axis=1, keepdims=True)
+    assert (np.einsum("vx,vx->v", felt.normals[rim, :2], radial) > 0.9).all()
