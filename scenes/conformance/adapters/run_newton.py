@@ -7,7 +7,7 @@ import numpy as np
 import warp
 from kit_files import run, stepped
 
-STEP_S, SWEEPS, CONTACT_N_PER_M, SKIN_M, DENSITY_KG_M3 = 1e-3, 20, 3e3, 1e-4, 1000.0
+STEP_S, SWEEPS, CONTACT_N_PER_M, SKIN_M, DENSITY_KG_M3 = 1e-3, 20, 3e2, 1e-4, 1000.0
 warp.config.log_level = warp.LOG_WARNING
 
 
