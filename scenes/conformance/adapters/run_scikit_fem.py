@@ -1,4 +1,4 @@
-"""scikit-fem: quadratic tetrahedra, small strains, statics; spheres on nodes by a penalty with friction."""
+"""scikit-fem: linear tetrahedra, small strains, statics; spheres on nodes by a penalty with friction."""
 
 import sys
 
@@ -8,14 +8,14 @@ from kit_files import run
 from scipy.sparse import csc_matrix, linalg
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-PENALTY, MISSED_M = 30.0, 1e-8  # a node's spring over the body's stiffness; their misfit at the end
-NEAR_RADII = 0.45  # nodes so near a tip's foot may touch
+PENALTY, MISSED_M, NEAR_RADII = 10.0, 1e-8, 0.45  # spring over stiffness; misfit; reach of a foot
+ELEMENT = skfem.ElementTetP1()  # by SciPy's factorisation ElementTetP2 takes minutes a body
 
 
 def condensed(body, physics, feet, radius):
     """(nodes (n, 3) m that may touch, their compliance (3 n, 3 n) m/N)."""
     mesh = skfem.MeshTet(body["points"].T, body["tetrahedra"].astype(np.int64).T)
-    basis = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementTetP2()))
+    basis = skfem.Basis(mesh, skfem.ElementVector(ELEMENT))
     elastic = linear_elasticity(*lame_parameters(physics["young_modulus_pa"], physics["poisson_ratio"]))
     stiffness, where = csc_matrix(elastic.assemble(basis)), basis.doflocs
     free = np.flatnonzero(where[2] > 1e-9)  # the base is held
@@ -53,7 +53,7 @@ def press(body, physics, t, centres):
     spring, force, u = PENALTY / np.median(np.diag(compliance)), np.zeros(centres.shape), 0 * points
     anchor, held = np.zeros_like(points), np.zeros(len(points), bool)
     for k, at in enumerate(centres):
-        for _ in range(200):
+        for tried in range(200):
             f, slope = springs(points + u - at[whose], anchor, held, spring, radius, mu)
             missed = u.ravel() - compliance @ f.ravel()
             if np.abs(missed).max() < MISSED_M:
@@ -62,7 +62,8 @@ def press(body, physics, t, centres):
             gives = compliance[:, own].reshape(len(own), -1, 3)
             moved = np.einsum("anj,njk->ank", gives, slope[own[::3]]).reshape(len(own), -1)
             step = missed + moved @ np.linalg.solve(np.eye(own.sum()) - moved[own], missed[own])
-            u = u - (step * min(1.0, 3e-4 / np.abs(step).max())).reshape(u.shape)
+            share = min((1.0, 0.5, 0.2, 0.1)[tried // 10 % 4], 3e-4 / np.abs(step).max())
+            u = u - share * step.reshape(u.shape)
         else:
             raise ArithmeticError(f"no balance at {t[k]:g} s: {np.abs(missed).max():.1g} m are left")
         relative = points + u - at[whose]
