@@ -43,6 +43,7 @@ OPERATIONS = {
     "devices": Entry("list the devices, and why some are not available"),
     "explore": Entry("suggest where to touch next, why, and when to stop"),
     "simulate": Entry("simulate a person's exploration of a phantom (the virtual laboratory)", "simulate"),
+    "conformance": Entry("write the kit that checks a soft-contact simulator", "conformance"),
     "bench": Entry("run a benchmark: medians, spreads and ratios"),
     "batch": Entry("reconstruct, compare and diagnose many recordings", "batch"),
     "completion": Entry("print a completion script for bash, zsh or fish"),
