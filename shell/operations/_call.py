@@ -19,8 +19,9 @@ Step = str | Callable[[], Sequence[str]]
 
 @dataclass
 class Call:
-    """One call of an operation, beside its operands. wanted: whether or where progress goes; command: from
-    the command line; out: what a command says on the way, silent in a Python call.
+    """One call of an operation, beside its operands. wanted: whether or where progress goes; command: its
+    name on the command line, '' for a Python call; out: what a command says on the way, silent in a Python
+    call.
 
     What a command does with the result comes after: it says the result's lines (unless `said`, on the way),
     then `steps`, then `following` (None: what the result's kind advises), writes the result's JSON with
@@ -29,7 +30,7 @@ class Call:
     """
 
     wanted: bool | Progress = True
-    command: bool = False
+    command: str = ""
     out: Output = dataclasses.field(default_factory=lambda: Output("-"))
     steps: list[Step] = dataclasses.field(default_factory=list)
     following: Sequence[Step] | None = None
@@ -74,12 +75,14 @@ class Call:
             return 0
         from palpate.show import next_lines
 
+        from palpate.schemas import labelled
         says = hasattr(result, "lines")
         if not self.said:
             self._say(result.lines() if says else [result] if isinstance(result, str) else [])
         self._say(self.steps)
         self._say(next_lines(result) if self.following is None else self.following)
-        self.out.json({**(result.as_json() if says else {}), **self.figures})
+        figures = {**(result.as_json() if says else {}), **self.figures}
+        self.out.json(labelled(self.command, figures))
         return self.exit_code() if callable(self.exit_code) else self.exit_code
 
     def _say(self, steps: Sequence[Step]) -> None:

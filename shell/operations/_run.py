@@ -46,7 +46,7 @@ def run_command(name: str, words: Sequence[str], parser: argparse.ArgumentParser
     out = Output(given.pop("json", None))
     operation, _ = command_operation(name)
     while True:
-        call = Call(command=True, out=out)
+        call = Call(command=name, out=out)
         try:
             return call.answer(operation.run(given, call))
         except RecordingError as error:

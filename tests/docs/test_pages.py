@@ -21,7 +21,13 @@ PAGES = [REPOSITORY / name for name in ("README.md", "CONVENTIONS.md")] + [
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 COUNTED = ("tutorials", "howto", "reading", "explanation", "develop")
 MOST_WORDS, MOST_README_WORDS, MOST_COLUMNS, MOST_DECISIONS = 25_000, 900, 120, 40
-GENERATED = {"commands", "options", "effects", *(f"commands/{name}" for name in _reference.commands())}
+GENERATED = {
+    "commands",
+    "options",
+    "effects",
+    "schemas",
+    *(f"commands/{name}" for name in _reference.commands()),
+}
 
 
 def _prose(page: Path) -> str:
