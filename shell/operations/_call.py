@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ from typing import Any
 from palpate.mechanics.progress import Progress, silent
 from palpate.output import Output, progress_bar
 
+_LOG = logging.getLogger("palpate.progress")
 Step = str | Callable[[], Sequence[str]]
 """What a command says: a line, or what makes lines when their turn comes."""
 
@@ -61,21 +63,21 @@ class Call:
     def progress(self, label: str) -> Iterator[Progress]:
         """Where progress goes: to a callable, to a bar on a terminal, or nowhere."""
         if callable(self.wanted):
-            yield self.wanted
+            yield _logged(label, self.wanted)
         elif self.wanted:
             with progress_bar(label) as bar:
-                yield bar
+                yield _logged(label, bar)
         else:
-            yield silent
+            yield _logged(label, silent)
 
     def answer(self, result: Any) -> int:
         """What a command does with the result; its exit code. A result says itself by `lines` and `as_json`;
         text is its own line, and None is nothing to say."""
         if result is None:
             return 0
+        from palpate.schemas import labelled
         from palpate.show import next_lines
 
-        from palpate.schemas import labelled
         says = hasattr(result, "lines")
         if not self.said:
             self._say(result.lines() if says else [result] if isinstance(result, str) else [])
@@ -88,6 +90,19 @@ class Call:
     def _say(self, steps: Sequence[Step]) -> None:
         for step in steps:
             self.out.say(*([step] if isinstance(step, str) else step()))
+
+
+def _logged(label: str, progress: Progress) -> Progress:
+    """The same, which also logs when a stage begins."""
+    stages: list[str] = [""]
+
+    def told(stage: str, fraction: float) -> None:
+        if stage != stages[-1]:
+            stages[0] = stage
+            _LOG.info("%s: %s", label, stage)
+        progress(stage, fraction)
+
+    return told
 
 
 def report_words(page: Path) -> str:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
+from palpate.logs import LEVELS
 from palpate.mechanics.disk.writing import JSON
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import near, unknown
@@ -150,6 +151,13 @@ def add_operation(parser: argparse.ArgumentParser, operation: Operation) -> None
             help="write the result as JSON; '-' writes only JSON to standard output",
         )
         action.on_command_line = OnCommandLine(writes=JSON)  # type: ignore[attr-defined]
+    level: Any = parser.add_argument(
+        "--log-level",
+        choices=LEVELS,
+        default=argparse.SUPPRESS,
+        help="what is logged to standard error, from this level on (default: warning)",
+    )
+    level.advanced = True
 
 
 def _title(kind: type) -> str:
