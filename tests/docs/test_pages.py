@@ -15,7 +15,9 @@ sys.path.insert(0, str(REPOSITORY / "docs"))
 import _reference  # noqa: E402
 
 DOCS = REPOSITORY / "docs"
-PAGES = [REPOSITORY / name for name in ("README.md", "CONVENTIONS.md")] + [
+PAGES = [
+    REPOSITORY / name for name in ("README.md", "CONVENTIONS.md", "CONTRIBUTING.md", "CODE_OF_CONDUCT.md")
+] + [
     page for page in sorted(DOCS.rglob("*.md")) if "generated" not in page.parts and "rooms" not in page.parts
 ]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
