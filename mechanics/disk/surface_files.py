@@ -21,6 +21,7 @@ from palpate.mechanics.disk.overheard import overheard
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
 from palpate.mechanics.errors import NotClosedError, SurfaceError
+from palpate.mechanics.extras import install_words
 from palpate.mechanics.quantities import parse_unit
 
 if TYPE_CHECKING:
@@ -162,7 +163,7 @@ def _shell_of(path: Path, metres: float) -> tuple[trimesh.Trimesh, tuple[Part, .
         name = suffix.removeprefix(".")
         raise SurfaceError(
             f"'{path}' needs {error.name or 'a library'} to be read as {name}, which is not installed: "
-            "pip install 'palpate[import]'"
+            + install_words("import", error.name)
         ) from error
     except (SystemExit, Exception) as error:  # each library has errors of its own for a damaged file
         reason = "it is damaged" if isinstance(error, SystemExit) else " ".join(str(error).split())[:200]
