@@ -193,7 +193,7 @@ _STATE = {
     "young_modulus_pa": MAYBE,
     "young_modulus_ci95_pa": many(MAYBE, 2),
     "surface_error_m": MAYBE,
-    "surface": ANYTHING,
+    "surface": TEXT,
     "goals": named(table({"now": MAYBE, "goal": NUMBER, "met": FLAG})),
     "done": FLAG,
     "causes": or_null(
@@ -207,8 +207,8 @@ _STATE = {
             }
         )
     ),
-    "update_s": MAYBE,
-    "trouble": ANYTHING,
+    "update_s": named(NUMBER),
+    "trouble": TEXT,
 }
 _SUGGESTED = table(
     {"kind": TEXT, "why": TEXT},
