@@ -12,6 +12,7 @@ import logging
 import sys
 import warnings
 from collections.abc import Iterator
+from typing import TextIO
 
 LEVELS = ("debug", "info", "warning", "error")
 LOG = logging.getLogger("palpate")
@@ -52,7 +53,14 @@ def set_level(level: str) -> None:
     LOG.setLevel(level.upper())
 
 
-def _warned(message: Warning | str, category: type[Warning], filename: str, lineno: int, *_: object) -> None:
+def _warned(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
     from palpate.mechanics.errors import PalpateWarning
 
     if issubclass(category, PalpateWarning):
