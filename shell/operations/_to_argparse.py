@@ -115,7 +115,8 @@ class OneLineParser(argparse.ArgumentParser):
         finally:
             for action, words in advanced.items():
                 action.help = words
-        return f"{text}\n{len(advanced)} more options: {self.prog} --help-all\n"
+        more = "more option" + "s" * (len(advanced) > 1)
+        return f"{text}\n{len(advanced)} {more}: {self.prog} --help-all\n"
 
     def format_all_help(self) -> str:
         """Every option."""
