@@ -27,6 +27,7 @@ from palpate.devices.base import Availability, Clock, DeviceSpec, host_clock
 from palpate.devices.codecs import haply as codec
 from palpate.devices.io_thread import ForcefulDevice, Reading, found
 from palpate.mechanics.errors import DeviceError
+from palpate.mechanics.extras import install_words
 from palpate.mechanics.options import check_ranges, option
 
 SPEC = DeviceSpec(
@@ -286,7 +287,7 @@ def _client() -> Any:
     try:
         from websockets.sync import client
     except ImportError as error:
-        raise DeviceError("the library websockets is missing: pip install websockets") from error
+        raise DeviceError(f"the library websockets is missing: {install_words('haply')}") from error
     return client
 
 

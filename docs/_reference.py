@@ -1,4 +1,4 @@
-"""The generated reference: commands, options and effects as the program states them.
+"""The generated reference: commands, options, effects and JSON Schemas as the program states them.
 
 `write(folder)` runs while the site is built; the pages are never committed.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import inspect
+import json
 import os
 import re
 import sys
@@ -117,12 +118,46 @@ def effects_page() -> str:
     return "\n".join(lines)
 
 
+def schema_files() -> dict[str, str]:
+    """Name of a file: its JSON Schema."""
+    from palpate.schemas import names, schema
+
+    return {f"{name}.schema.json": json.dumps(schema(name), indent=1) + "\n" for name in names()}
+
+
+def schemas_page() -> str:
+    """Every schema, folded."""
+    lines = [
+        "# JSON Schemas",
+        "",
+        "Of what each command writes with `--json`, and of each TOML that it reads or writes (draft",
+        "2020-12). The key `schema` of a `--json` is the `$id` of its schema, whose last part is the",
+        "version: keys may join one; a key that is renamed or means something else makes the next. In Python",
+        '`palpate.schemas.schema("diagnose")`.',
+        "",
+    ]
+    for file, text in schema_files().items():
+        url = f"../../schemas/{file}"
+        lines += [f"## {file.removesuffix('.schema.json')}", "", f"<a href='{url}'>{file}</a>", ""]
+        lines += [
+            "<details><summary>show</summary>",
+            "",
+            "```json",
+            text.rstrip(),
+            "```",
+            "",
+            "</details>",
+            "",
+        ]
+    return "\n".join(lines)
+
+
 def _cell(words: str) -> str:
     return re.sub(r"([*<|])", r"\\\1", words)
 
 
 def pages() -> dict[str, str]:
-    """path below the folder: Markdown."""
+    """path below the folder: Markdown; below `files/`, what the site carries as it is."""
     made = {f"commands/{name}.md": command_page(name, *about) for name, about in commands().items()}
     listed = [
         f"| [`palpate {name}`](commands/{name}.md) | {words} |" for name, (words, _) in commands().items()
@@ -137,6 +172,8 @@ def pages() -> dict[str, str]:
     )  # fmt: skip
     made["options.md"] = options_page()
     made["effects.md"] = effects_page()
+    made["schemas.md"] = schemas_page()
+    made |= {f"files/schemas/{name}": text for name, text in schema_files().items()}
     return made
 
 

@@ -35,6 +35,7 @@ html_theme = "furo"
 html_title = f"Palpate {release}"
 html_show_copyright = False
 html_favicon = None
+html_extra_path = ["reference/generated/files"]  # schemas/NAME.schema.json
 exclude_patterns = ["**/README.md"]
 # names of constants that are unpacked from a tuple are there all the same
 # annotations name local types by their last word, which others share

@@ -84,26 +84,16 @@ def _is_ours(name: str | None) -> bool:
 
 def _run(command: argparse.ArgumentParser, name: str, words: list[str]) -> int:
     """The one place where errors become a line and an exit code."""
-    import warnings
-
+    from palpate.logs import on_stderr
     from palpate.mechanics.disk.reading import refusal
-    from palpate.mechanics.errors import PalpateError, PalpateWarning
+    from palpate.mechanics.errors import PalpateError
     from palpate.operations._run import run_command
 
     def refused(words: str) -> int:
         print(f"{command.prog}: {' '.join(words.split())}", file=sys.stderr)
         return 2
 
-    plain = warnings.showwarning
-
-    def warned(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
-        if issubclass(category, PalpateWarning):
-            refused(f"warning: {message}")
-        else:
-            plain(message, category, *rest, **more)
-
-    with warnings.catch_warnings():
-        warnings.showwarning = warned
+    with on_stderr(command.prog):
         try:
             return run_command(name, words, command)
         except PalpateError as error:

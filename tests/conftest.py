@@ -23,6 +23,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 from palpate.mechanics.kernel_cache import sources  # noqa: E402  mechanics chooses where kernels are kept, before a test decorates one
 
 from .support.once import compile_one_at_a_time, folder_made_once, one_at_a_time  # noqa: E402
+from .support.schemas import check_every_json  # noqa: E402
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 WORKER = "PYTEST_XDIST_WORKER" in os.environ and os.name == "posix"
 if WORKER:
     compile_one_at_a_time()
+check_every_json()
 
 
 @pytest.hookimpl(wrapper=True)

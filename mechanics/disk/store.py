@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import numpy as np
 from palpate.mechanics.disk.writing import atomic_file
 from palpate.mechanics.errors import CacheError
 
+_LOG = logging.getLogger(__name__)
 _MAGIC = b"PALPATE2"
 _ALIGN, _START, _DIGEST = 64, 16, 32
 
@@ -110,8 +112,8 @@ def load_or_build(
     if path is not None:
         try:
             return read_arrays(path, key)
-        except CacheError:
-            pass  # absent, damaged or of other content: built anew below
+        except CacheError as wrong:  # absent, damaged or of other content
+            _LOG.info("computed anew: %s", wrong)
     arrays = {name: np.ascontiguousarray(array).view() for name, array in build().items()}
     for array in arrays.values():
         array.setflags(write=False)  # as mapped ones are: to the kernels' compiler others are another type
@@ -119,6 +121,6 @@ def load_or_build(
         try:
             write_arrays(path, key, arrays)
             return read_arrays(path, key)
-        except (OSError, CacheError):
-            pass  # a full or read-only disk: the arrays in memory serve as well
+        except (OSError, CacheError) as refused:  # a full or read-only disk: those in memory serve as well
+            _LOG.info("'%s' is not kept: %s", path, refused)
     return arrays

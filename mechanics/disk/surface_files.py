@@ -6,10 +6,8 @@ triangles come out outward.
 
 from __future__ import annotations
 
-import contextlib
-import io
-import warnings
-from collections.abc import Iterator, Mapping
+import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,14 +17,17 @@ import numpy as np
 from palpate.mechanics.disk.gmsh1 import is_gmsh1, read_gmsh1
 from palpate.mechanics.disk.holes import close
 from palpate.mechanics.disk.mesh_parts import Part, bodies, labels
+from palpate.mechanics.disk.overheard import overheard
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
 from palpate.mechanics.errors import NotClosedError, SurfaceError
+from palpate.mechanics.extras import install_words
 from palpate.mechanics.quantities import parse_unit
 
 if TYPE_CHECKING:
     import trimesh
 
+_LOG = logging.getLogger(__name__)
 BY_TRIMESH = (".stl", ".obj", ".ply", ".gltf", ".glb", ".off", ".3mf")
 BY_VTK = (".vtp", ".vtu", ".vtk")
 BY_MESHIO = {".msh": "gmsh", ".inp": "abaqus"}
@@ -76,7 +77,7 @@ def read_surface(path: Path | str, unit: str = "m", up: np.ndarray | None = None
     if not path.is_file():
         raise SurfaceError(f"'{path}' {no_file(path)}: name a file that is there")
     shell, labelled = _shell_of(path, UNITS[unit])
-    with _silent():
+    with overheard(_LOG):
         return _closed(shell, path.name, unit, up, labelled, path)
 
 
@@ -97,7 +98,7 @@ def surface_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> Clo
     if unit not in UNITS:
         raise SurfaceError(f"unit is '{unit}'; allowed are {', '.join(UNITS)}")
     mesh = trimesh.Trimesh(np.array(shape.vertices, dtype=float), np.array(shape.faces), process=False)
-    with _silent():
+    with overheard(_LOG):
         return _closed(mesh, "the mesh", unit, up)
 
 
@@ -149,7 +150,7 @@ def _shell_of(path: Path, metres: float) -> tuple[trimesh.Trimesh, tuple[Part, .
             import meshio
             import pyvista
 
-            with _silent():
+            with overheard(_LOG):
                 if suffix == ".msh" and is_gmsh1(path):
                     held = read_gmsh1(path)
                 else:
@@ -162,7 +163,7 @@ def _shell_of(path: Path, metres: float) -> tuple[trimesh.Trimesh, tuple[Part, .
         name = suffix.removeprefix(".")
         raise SurfaceError(
             f"'{path}' needs {error.name or 'a library'} to be read as {name}, which is not installed: "
-            "pip install 'palpate[import]'"
+            + install_words("import", error.name)
         ) from error
     except (SystemExit, Exception) as error:  # each library has errors of its own for a damaged file
         reason = "it is damaged" if isinstance(error, SystemExit) else " ".join(str(error).split())[:200]
@@ -184,24 +185,6 @@ def _within(folder: Path) -> Any:
             return _within(folder / namespace)
 
     return Within(str(folder))
-
-
-@contextlib.contextmanager
-def _silent() -> Iterator[None]:
-    """What readers say of a damaged file goes into one line of ours."""
-    import logging
-
-    level = logging.root.manager.disable
-    logging.disable(logging.CRITICAL)
-    try:
-        with (
-            warnings.catch_warnings(action="ignore"),
-            contextlib.redirect_stdout(io.StringIO()),
-            contextlib.redirect_stderr(io.StringIO()),
-        ):
-            yield
-    finally:
-        logging.disable(level)
 
 
 def _boundary(grid: Any, names: Mapping[int, str], metres: float) -> tuple[trimesh.Trimesh, tuple[Part, ...]]:

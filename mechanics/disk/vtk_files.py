@@ -5,15 +5,17 @@ from __future__ import annotations
 import base64
 import logging
 import re
-import warnings
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
+from palpate.mechanics.disk.overheard import overheard
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.errors import PalpateError
+
+_LOG = logging.getLogger(__name__)
 
 
 def vtk_bytes(dataset: Any) -> bytes:
@@ -38,16 +40,14 @@ def read_vtk(path: Path, error: type[PalpateError]) -> Any:
 
     with reading(path, error):
         data = path.read_bytes()
-    said, logged = vtkLogger.GetCurrentVerbosityCutoff(), logging.root.manager.disable
+    said = vtkLogger.GetCurrentVerbosityCutoff()
     try:
         if data.lstrip()[:1] == b"<":  # the older text format makes room for what is there
             _check_counts(data)
             _check_arrays(data)
-        # what it complains about is raised: not printed, and logged, too
+        # what it complains about is raised, not printed by VTK itself, too
         vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-        logging.disable(logging.CRITICAL)
-        with pyvista.VtkErrorCatcher(raise_errors=True), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with overheard(_LOG), pyvista.VtkErrorCatcher(raise_errors=True):
             return pyvista.read(path)
     except (RuntimeError, ValueError, TypeError, KeyError, IndexError, MemoryError, OSError) as wrong:
         raise error(
@@ -55,7 +55,6 @@ def read_vtk(path: Path, error: type[PalpateError]) -> Any:
         ) from wrong
     finally:
         vtkLogger.SetStderrVerbosity(said)
-        logging.disable(logged)
 
 
 def _check_counts(data: bytes) -> None:

@@ -8,6 +8,7 @@ renamed); an output replaces nothing but its own kind; what the operating system
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import shutil
 import tempfile
@@ -22,6 +23,7 @@ from palpate.mechanics.disk.reading import refusal
 from palpate.mechanics.disk.scratch import OLD, sweep, sweep_scratch, temporary_prefix
 from palpate.mechanics.errors import FileError, PalpateError
 
+_LOG = logging.getLogger(__name__)
 _HEAD_BYTES = 1 << 16
 _WHOLE_BYTES = 1 << 26
 _PROBE_BYTES = 1 << 16
@@ -168,6 +170,7 @@ def atomic_file(path: Path | str, kind: Kind | None = None) -> Iterator[Path]:
             os.umask(umask)
             temporary.chmod(0o666 & ~umask)
             os.replace(temporary, target)
+            _LOG.debug("written: %s", target)
         finally:
             temporary.unlink(missing_ok=True)
 
@@ -197,6 +200,7 @@ def atomic_folder(path: Path | str, kind: FolderKind) -> Iterator[Path]:
                 old = Path(tempfile.mkdtemp(prefix=temporary_prefix(OLD), dir=target.parent))
                 os.replace(target, old / target.name)
             os.replace(temporary, target)
+            _LOG.debug("written: %s", target)
         except BaseException:
             if old is not None and not target.exists():
                 os.replace(old / target.name, target)

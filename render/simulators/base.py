@@ -22,6 +22,7 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
 from palpate.mechanics.errors import OptionError, PalpateError
+from palpate.mechanics.extras import install_words
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.names import number, pairs, words_of
 from palpate.mechanics.shape.refine import refined_around
@@ -308,7 +309,8 @@ class SimulatorRenderer(Renderer):
 def missing(adapter: type[Adapter], error: ImportError) -> OptionError:
     """What is said where a simulator is not installed."""
     return OptionError(
-        f"'{adapter.name}' needs {error.name}, which is not installed: pip install 'palpate[{adapter.extra}]'"
+        f"'{adapter.name}' needs {error.name}, which is not installed: "
+        + install_words(adapter.extra, error.name)
     )
 
 

@@ -10,7 +10,7 @@ say which mesh, touches and material it was made from: a file of others is made 
 from __future__ import annotations
 
 import json
-import warnings
+import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
+from palpate.mechanics.disk.overheard import overheard
 from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.disk.toml_text import plain
 from palpate.mechanics.disk.vtk_files import vtk_bytes
@@ -33,6 +34,7 @@ from palpate.render.fem.renderer import FemRenderer
 from palpate.render.options import RenderOptions
 from palpate.render.surface.snapping import surface_uncertainty, touched_surface
 
+_LOG = logging.getLogger(__name__)
 OWN_DEPTH_M = 1e-3
 """Depth of the press by which a place's own stiffness is stated."""
 PRESSES, TOUCHES = "presses", "touch sites"
@@ -203,8 +205,8 @@ def _keep(model: Model, surface: FeltSurface) -> FeltSurface:
     try:
         with atomic_file(Path(model.path) / FELT) as temporary:
             temporary.write_bytes(vtk_bytes(shape))
-    except OSError:
-        pass  # a full or read-only disk: the surface in memory serves as well
+    except OSError as refused:  # a full or read-only disk: the surface in memory serves as well
+        _LOG.info("'%s' is not kept: %s", Path(model.path) / FELT, refused)
     return surface
 
 
@@ -217,8 +219,7 @@ def _load(model: Model) -> FeltSurface | None:
         return None
     try:
         # what a damaged file makes the reader say is an answer here, not a warning
-        with pyvista.VtkErrorCatcher(raise_errors=True), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with overheard(_LOG), pyvista.VtkErrorCatcher(raise_errors=True):
             shape = pyvista.read(path)
         if str(shape.field_data["shape_key"][0]) != _shape_key(model):
             return None
@@ -236,5 +237,6 @@ def _load(model: Model) -> FeltSurface | None:
             stiffness,
             source,
         )
-    except (AttributeError, KeyError, IndexError, RuntimeError, ValueError, OSError):
+    except (AttributeError, KeyError, IndexError, RuntimeError, ValueError, OSError) as wrong:
+        _LOG.info("'%s' is made anew: %s", path, wrong)
         return None

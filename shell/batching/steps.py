@@ -18,6 +18,7 @@ from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.recording.recording import Recording
 from palpate.operations.read_recording import read_recording
 from palpate.output import emit_json
+from palpate.schemas import labelled
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,8 @@ def reconstruct(**planned: Any) -> dict[str, Any]:
     measured = plan.read()
     given = {**plan.options, **({"shape": plan.shape} if plan.shape else {})}
     result = reconstruct(measured, save=place / MODEL, seed=plan.seed, progress=False, **given)
-    emit_json({"model": place / MODEL, **result.as_json()}, str(place / "reconstruct.json"))
+    figures = {"model": place / MODEL, **result.as_json()}
+    emit_json(labelled("reconstruct", figures), str(place / "reconstruct.json"))
     with _closing_figures():
         _draw_thumbnail(result.model, place / THUMBNAIL)
         if plan.reports:
@@ -94,7 +96,7 @@ def diagnose(**planned: Any) -> dict[str, Any]:
 
 
 def _written(plan: Planned, step: str, result: Any, figures: Mapping[str, Any]) -> None:
-    emit_json(figures, str(plan.place / f"{step}.json"))
+    emit_json(labelled(step, dict(figures)), str(plan.place / f"{step}.json"))
     with _closing_figures():
         if plan.reports:
             result.report(plan.place / f"{step}.html")

@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from palpate.exporting import abaqus, gmsh, mujoco, scripts, sofa, stl, usd
+from palpate.exporting.recorded import Recorded
 from palpate.exporting.subject import Subject, subject_of
 from palpate.mechanics.disk.surface_files import UNITS
 from palpate.mechanics.disk.writing import Kind, atomic_file
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.extras import install_words
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
 
@@ -86,6 +89,56 @@ FORMATS = {
         "open {path} in any program that draws or prints shapes",
     ),
 }
+
+
+@dataclass(frozen=True)
+class RecordedFormat:
+    """A format that a recording is written in. module: whose `write(path, recorded, progress)` returns what
+    the file does not say; extra: that has its libraries; the others as in `ExportFormat`."""
+
+    suffix: str
+    module: str
+    extra: str
+    kind: Kind
+    opened_by: str
+
+
+RECORDED = {
+    "mcap": RecordedFormat(
+        ".mcap",
+        "palpate.exporting.mcap",
+        "mcap",
+        Kind("an MCAP", (b"\x89MCAP0\r\n",)),
+        "play it: `ros2 bag play {path}`, or open it in Foxglove or PlotJuggler",
+    ),
+    "rerun": RecordedFormat(
+        ".rrd",
+        "palpate.exporting.rerun",
+        "rerun",
+        Kind("a recording of Rerun", (b"RRF",)),
+        "look at it: `rerun {path}`",
+    ),
+}
+
+
+def write_recorded(told: Recorded, to: str, path: Path | str, progress: Progress = silent) -> tuple[str, ...]:
+    """Write a recording for another program; what its format cannot say, one line each. Raises OptionError
+    for another suffix, or where its library is not installed."""
+    chosen, path = RECORDED[to], Path(path)
+    check_recorded(to, path)
+    try:
+        with atomic_file(path, chosen.kind) as temporary:
+            return import_module(chosen.module).write(temporary, told, progress)
+    except ImportError as error:
+        raise OptionError(
+            f"--to {to} needs {error.name}, which is not installed: {install_words(chosen.extra)}"
+        ) from error
+
+
+def check_recorded(to: str, path: Path) -> None:
+    """Raise OptionError for a suffix that does not fit."""
+    if path.suffix.lower() != RECORDED[to].suffix:
+        raise OptionError(f"'{path}' must end in {RECORDED[to].suffix} for {to}")
 
 
 def write(

@@ -44,7 +44,7 @@ _NUMBERS = {
     "rate_hz": FileKey(low=1e-3, high=1e6, unit="Hz"),
     "tare_s": FileKey(size=2, unit="s"),
 }
-_SCHEMA: Schema = {
+MAPPING: Schema = {
     "columns": dict.fromkeys(ROLES),
     "units": dict.fromkeys(SI, FileKey(str)),
     "tool": {name: _NUMBERS[name] for name in ("tip_radius_m", "mass_kg", "flange_to_tip_m")},
@@ -109,7 +109,7 @@ def read_mapping(path: Path | str) -> dict[str, Any]:
     """The fields of a mapping file; raises RecordingError for one that is no TOML or has another key."""
     path = Path(path)
     held = read_toml(path, RecordingError)
-    check_table(held, _SCHEMA, path, RecordingError, strict=True)
+    check_table(held, MAPPING, path, RecordingError, strict=True)
     found: dict[str, Any] = {}
     for table in ("columns", "units"):
         if table in held:

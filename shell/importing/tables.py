@@ -13,6 +13,7 @@ import numpy as np
 from palpate.importing.formats.registry import by_suffix
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.errors import RecordingError
+from palpate.mechanics.extras import install_words
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,8 @@ def read_tables(path: Path | str) -> list[Table]:
         raise
     except ModuleNotFoundError as error:
         raise RecordingError(
-            f"'{path}' needs {needs}, and {error.name} is not installed: pip install 'palpate[import]'"
+            f"'{path}' needs {needs}, and {error.name} is not installed: "
+            + install_words("import", error.name)
         ) from error
     except Exception as error:  # each library has errors of its own for a damaged file
         reason = " ".join(str(error).split())[:200] or type(error).__name__

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,14 +14,16 @@ from typing import Any
 from palpate.mechanics.progress import Progress, silent
 from palpate.output import Output, progress_bar
 
+_LOG = logging.getLogger("palpate.progress")
 Step = str | Callable[[], Sequence[str]]
 """What a command says: a line, or what makes lines when their turn comes."""
 
 
 @dataclass
 class Call:
-    """One call of an operation, beside its operands. wanted: whether or where progress goes; command: from
-    the command line; out: what a command says on the way, silent in a Python call.
+    """One call of an operation, beside its operands. wanted: whether or where progress goes; command: its
+    name on the command line, '' for a Python call; out: what a command says on the way, silent in a Python
+    call.
 
     What a command does with the result comes after: it says the result's lines (unless `said`, on the way),
     then `steps`, then `following` (None: what the result's kind advises), writes the result's JSON with
@@ -29,7 +32,7 @@ class Call:
     """
 
     wanted: bool | Progress = True
-    command: bool = False
+    command: str = ""
     out: Output = dataclasses.field(default_factory=lambda: Output("-"))
     steps: list[Step] = dataclasses.field(default_factory=list)
     following: Sequence[Step] | None = None
@@ -60,18 +63,19 @@ class Call:
     def progress(self, label: str) -> Iterator[Progress]:
         """Where progress goes: to a callable, to a bar on a terminal, or nowhere."""
         if callable(self.wanted):
-            yield self.wanted
+            yield _logged(label, self.wanted)
         elif self.wanted:
             with progress_bar(label) as bar:
-                yield bar
+                yield _logged(label, bar)
         else:
-            yield silent
+            yield _logged(label, silent)
 
     def answer(self, result: Any) -> int:
         """What a command does with the result; its exit code. A result says itself by `lines` and `as_json`;
         text is its own line, and None is nothing to say."""
         if result is None:
             return 0
+        from palpate.schemas import labelled
         from palpate.show import next_lines
 
         says = hasattr(result, "lines")
@@ -79,12 +83,26 @@ class Call:
             self._say(result.lines() if says else [result] if isinstance(result, str) else [])
         self._say(self.steps)
         self._say(next_lines(result) if self.following is None else self.following)
-        self.out.json({**(result.as_json() if says else {}), **self.figures})
+        figures = {**(result.as_json() if says else {}), **self.figures}
+        self.out.json(labelled(self.command, figures))
         return self.exit_code() if callable(self.exit_code) else self.exit_code
 
     def _say(self, steps: Sequence[Step]) -> None:
         for step in steps:
             self.out.say(*([step] if isinstance(step, str) else step()))
+
+
+def _logged(label: str, progress: Progress) -> Progress:
+    """The same, which also logs when a stage begins."""
+    stages: list[str] = [""]
+
+    def told(stage: str, fraction: float) -> None:
+        if stage != stages[-1]:
+            stages[0] = stage
+            _LOG.info("%s: %s", label, stage)
+        progress(stage, fraction)
+
+    return told
 
 
 def report_words(page: Path) -> str:

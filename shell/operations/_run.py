@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from palpate.logs import set_level
 from palpate.mechanics.disk.scratch import sweep_scratch
 from palpate.mechanics.disk.writing import FolderKind, Kind, check_target, written_at
 from palpate.mechanics.errors import OptionError, PalpateError, RecordingError
@@ -44,9 +45,10 @@ def run_command(name: str, words: Sequence[str], parser: argparse.ArgumentParser
     sweep_scratch()
     given = vars(arguments)
     out = Output(given.pop("json", None))
+    set_level(given.pop("log_level", "warning"))
     operation, _ = command_operation(name)
     while True:
-        call = Call(command=True, out=out)
+        call = Call(command=name, out=out)
         try:
             return call.answer(operation.run(given, call))
         except RecordingError as error:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
+from palpate.logs import LEVELS
 from palpate.mechanics.disk.writing import JSON
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import near, unknown
@@ -114,7 +115,8 @@ class OneLineParser(argparse.ArgumentParser):
         finally:
             for action, words in advanced.items():
                 action.help = words
-        return f"{text}\n{len(advanced)} more options: {self.prog} --help-all\n"
+        more = "more option" + "s" * (len(advanced) > 1)
+        return f"{text}\n{len(advanced)} {more}: {self.prog} --help-all\n"
 
     def format_all_help(self) -> str:
         """Every option."""
@@ -150,6 +152,13 @@ def add_operation(parser: argparse.ArgumentParser, operation: Operation) -> None
             help="write the result as JSON; '-' writes only JSON to standard output",
         )
         action.on_command_line = OnCommandLine(writes=JSON)  # type: ignore[attr-defined]
+    level: Any = parser.add_argument(
+        "--log-level",
+        choices=LEVELS,
+        default=argparse.SUPPRESS,
+        help="what is logged to standard error, from this level on (default: warning)",
+    )
+    level.advanced = True
 
 
 def _title(kind: type) -> str:

@@ -18,6 +18,7 @@ from palpate.operations._call import Call
 from palpate.operations._declare import argument, operation
 from palpate.operations._to_argparse import OneLineParser
 from palpate.output import emit_json
+from palpate.schemas import labelled
 
 _HELPERS = ("evidence", "timing")
 
@@ -97,6 +98,6 @@ def bench(
     )
     own = parser.parse_args(rest)
     figures = module.run(own)
-    emit_json(figures, own.json)
+    emit_json(labelled("bench", figures), own.json)
     if own.evidence:
         _keep(own.evidence, name, rest, figures.get("figures", ()))

@@ -5,7 +5,7 @@ fx, fy, fz, qw, qx, qy, qz; '#3' is the third column, '-NAME' its negative, '=0'
 'TOPIC:NAME' one of several tables), or by a --mapping file. Units come from the names ('Load (uN)', 'x_mm')
 or --units position=mm,force=N,time=ms. A picture of what was understood is drawn before anything is
 written. Several FILEs have clocks of their own, which are joined. Rows without a time are quasi-static
-points. Libraries beyond the program's own: palpate[import].
+points. Libraries beyond the program's own: extra 'import'.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Who does the tasks: threads of `concurrent.futures` here, or of Dask's workers (palpate[cluster]) wherever
+"""Who does the tasks: threads of `concurrent.futures` here, or of Dask's workers (extra 'cluster') wherever
 the same folders are seen. Either has processes of its own (`parallel.process`)."""
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any, Protocol, Self
 import psutil
 
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.extras import install_words
 from palpate.parallel.process import in_own_process, stop
 from palpate.parallel.tasks import Answer
 
@@ -92,7 +93,7 @@ class DaskEngine:
             from distributed import Client
         except ImportError as error:
             raise OptionError(
-                "--scheduler needs Dask: pip install 'palpate[cluster]', here and where the workers run"
+                f"--scheduler needs Dask: {install_words('cluster')}, here and where the workers run"
             ) from error
         until = time.monotonic() + within_s
         while True:

@@ -87,6 +87,7 @@ ELSEWHERE = {
     "palpate compare": "tests/diagnose/compare",
     "palpate devices --measure": "tests/devices/test_devices_command.py",
     "palpate diagnose": "examples/plot_05_a_slow_sensor.py",
+    "palpate export silicone-1-cylinder": "tests/shell/exporting/test_recorded.py",
     "palpate explore": "tests/diagnose/explore",
     "palpate import bag_folder": "tests/shell/importing/test_import.py",
     "palpate import palpation.csv": "tests/shell/importing/test_import.py",

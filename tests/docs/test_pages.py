@@ -15,13 +15,21 @@ sys.path.insert(0, str(REPOSITORY / "docs"))
 import _reference  # noqa: E402
 
 DOCS = REPOSITORY / "docs"
-PAGES = [REPOSITORY / name for name in ("README.md", "CONVENTIONS.md")] + [
+PAGES = [
+    REPOSITORY / name for name in ("README.md", "CONVENTIONS.md", "CONTRIBUTING.md", "CODE_OF_CONDUCT.md")
+] + [
     page for page in sorted(DOCS.rglob("*.md")) if "generated" not in page.parts and "rooms" not in page.parts
 ]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 COUNTED = ("tutorials", "howto", "reading", "explanation", "develop")
 MOST_WORDS, MOST_README_WORDS, MOST_COLUMNS, MOST_DECISIONS = 25_000, 900, 120, 40
-GENERATED = {"commands", "options", "effects", *(f"commands/{name}" for name in _reference.commands())}
+GENERATED = {
+    "commands",
+    "options",
+    "effects",
+    "schemas",
+    *(f"commands/{name}" for name in _reference.commands()),
+}
 
 
 def _prose(page: Path) -> str:

@@ -52,7 +52,7 @@ def test_help_shows_what_most_use_and_all_that_was_promised(name):
     assert all(re.search(rf"{flag}\b", whole) for flag in flags)
     hidden = [f for f, a in flags.items() if a not in shown]
     assert not [f for f in hidden if re.search(rf"(?<![\w-]){f}(?![\w-])", short.partition("options:")[2])]
-    assert bool(hidden) == (f"more options: palpate {name} --help-all" in short)
+    assert bool(hidden) == (f": palpate {name} --help-all" in short)
     operation, _ = command_operation(name)
     assert operation.common <= {f for f in operation.fields if f not in operation.own}
 

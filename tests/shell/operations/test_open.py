@@ -33,7 +33,7 @@ def test_a_machines_curve_becomes_a_material_and_a_page(tmp_path, monkeypatch, c
     said = capsys.readouterr().out
     assert "dent.csv" in said and "odds" in said
     held = json.loads((tmp_path / "out.json").read_text())
-    assert set(held) == {"kind", "understood", "odds", "result"} and held["kind"] == "curves"
+    assert set(held) == {"schema", "kind", "understood", "odds", "result"} and held["kind"] == "curves"
     assert held["odds"] >= 9 and held["result"]["young_modulus_pa"] == pytest.approx(MODULUS, rel=0.1)
     page = (tmp_path / "dent-palpate.html").read_text()
     assert page.rstrip().endswith("</html>")

@@ -171,7 +171,8 @@ def test_no_two_options_of_one_operation_share_a_name(name):
 def test_a_command_and_its_call_take_the_same_names_defaults_and_needs(name):
     """But for a file to write that a command alone needs: a call hands its result back."""
     operation, _ = command_operation(name)
-    flags = {a.dest: a for a in parser_of(name)._actions if a.dest not in ("help", "json", argparse.SUPPRESS)}
+    of_all = ("help", "json", "log_level", argparse.SUPPRESS)
+    flags = {a.dest: a for a in parser_of(name)._actions if a.dest not in of_all}
     parameters = dict(inspect.signature(getattr(pp, operation.name)).parameters)
     parameters.pop("progress", None)
     only = {n: written(f).only for n, f in operation.fields.items()}
