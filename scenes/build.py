@@ -270,7 +270,7 @@ def _built(
     material = replace(
         own,
         field=field(mesh) if field else None,
-        young_modulus_pa=scene.young_modulus_pa or own.young_modulus_pa,
+        young_modulus_pa=scene.one_modulus_pa or own.young_modulus_pa,
         poisson_ratio=own.poisson_ratio if scene.poisson_ratio is None else scene.poisson_ratio,
         dent_law="neo-hookean" if scene.finite_strain else "linear",
     )
@@ -307,8 +307,8 @@ def _from_model(scene: Scene, progress: Progress) -> Model:
 
 def _changed(scene: Scene, model: Model) -> Model:
     """What the scene says over what the model holds."""
-    if scene.young_modulus_pa is not None:
-        model = model.with_modulus(scene.young_modulus_pa)
+    if scene.one_modulus_pa is not None:
+        model = model.with_modulus(scene.one_modulus_pa)
     if scene.poisson_ratio is not None:
         model = model.with_material(poisson_ratio=scene.poisson_ratio)
     if scene.inclusions is not None:

@@ -118,6 +118,11 @@ class Scene:
                 "make its model anew with palpate model FILE --modulus NAME=PA"
             )
 
+    @property
+    def one_modulus_pa(self) -> float | None:
+        """Pa, of the whole object; None where each part has its own, or none is said."""
+        return None if isinstance(self.young_modulus_pa, Mapping) else self.young_modulus_pa
+
 
 def scene_names() -> list[str]:
     """Names of the embedded scenes."""

@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 atomic_file(arguments.folder / f"{body.name}.npz") as temporary,
                 temporary.open("wb") as file,
             ):
-                np.savez_compressed(file, **solved)
+                np.savez_compressed(file, allow_pickle=False, **solved)
             said[body.name] = {"nodes": len(solved["points"]), "cpu_s": time.process_time() - began}
             print(f"{body.name}: {said[body.name]}", flush=True)
     return said

@@ -22,8 +22,8 @@ import numpy as np
 
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.leave_one_out import JudgedSet
-from palpate.diagnosis.search.naming import Score, beside_best
-from palpate.diagnosis.search.rivals import Choice, Explanation, of_one_phenomenon, posterior
+from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.rivals import Choice, Explanation, Names, of_one_phenomenon, posterior
 from palpate.mechanics.effects.base import Effect, Scope
 from palpate.mechanics.progress import Progress, silent
 
@@ -88,6 +88,8 @@ def _cost(search: Search, candidate: JudgedSet) -> np.ndarray:
     return there.judge(candidate.found.effects, like=candidate).held + there.whitener.volume
 
 
+UNLIKELY, MOST_TOLD_APART = 0.02, 4
+"""Probability down to which others are told apart from the best by fits of both; how many at most."""
 SHOWN, MOST_SHOWN = 10.0, 4
 """Gain in log likelihood from which an effect on a simulator's force is there, if not alone; of how many such
 effects pairs are tried."""
@@ -166,7 +168,7 @@ def attribute(
         able = [s for s in scores.values() if search.able(s, first=first) and s.size_n > least]
         if search.forward.measured and search.sideways_off(current):
             able = _not_blind_to_slip(search, able)
-        log_odds = beside_best(able)
+        log_odds: dict[Names, float] = {(s.name,): s.log_odds for s in able}
         known = [scores[n] for n in sorted(seen) if n in scores]
         known = [s for s in known if s.size_n > search.smallest_n]
         passing = known or [s for s in able if s.probability > search.options.sure]
@@ -194,7 +196,7 @@ def attribute(
         chosen.append(best.name)
         others = {n: x for n, x in log_odds.items() if not of_one_phenomenon(scores[n[0]].effect, best.added)}
         choice = Choice({**others, (best.name,): best.log_odds}, (best.name,), certain=bool(known))
-        choices.append(_with_both(search, choice, scores, best))
+        choices.append(_told_apart(search, choice, scores, best))
         search.renew(best.candidate.found)
         current, strain_gain, strain_closes = _with_strain(search, best.candidate.found.effects)
     taken = tuple(chosen)[: len(steps)]
@@ -210,20 +212,26 @@ def attribute(
     )  # fmt: skip
 
 
-def _with_both(search: Search, choice: Choice, scores: dict[str, Score], best: Score) -> Choice:
-    """The choice, with the odds of the best effect once another is there that it leaves in doubt: each by
-    itself may be all, or the first of two."""
-    beside = {}
-    for names, probability in choice.probabilities().items():
-        if not names or names == choice.taken or probability <= search.options.doubt:
-            continue
-        other = scores[names[0]].candidate
-        there = search.reweighed(other.found)
-        alone = there.judge(other.found.effects, like=other)
-        both = there.judge([*other.found.effects, *best.added], like=other)
-        score = there.score(best.added, both, alone)
-        beside[names] = score.log_odds if there.able(score, first=False) else -np.inf
-    return dataclasses.replace(choice, beside=beside)
+def _told_apart(search: Search, choice: Choice, scores: dict[str, Score], best: Score) -> Choice:
+    """The choice, with the odds of the likeliest others as they follow from the best and both together.
+
+    Two effects that leave the same to each other are as likely; one that leaves much to the best, to which it
+    adds nothing, is not, whatever either gains by itself.
+    """
+    likely = sorted(choice.probabilities().items(), key=lambda item: -item[1])
+    others = [n for n, p in likely if n and n != choice.taken and p > UNLIKELY][:MOST_TOLD_APART]
+    there = search.reweighed(best.candidate.found)
+    odds = dict(choice.log_odds)
+    for names in others:
+        other = scores[names[0]]
+        rest = [e for e in best.candidate.found.effects if e not in best.added]
+        alone = there.judge(best.candidate.found.effects, like=best.candidate)
+        instead = there.judge([*rest, *other.added], like=other.candidate)
+        both = there.judge([*alone.found.effects, *other.added], like=alone)
+        adds = there.score(other.added, both, alone).log_odds
+        lacks = there.score(best.added, both, instead).log_odds
+        odds[names] = min(odds[names], best.log_odds + adds - lacks)
+    return dataclasses.replace(choice, log_odds=odds)
 
 
 def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:

@@ -11,7 +11,6 @@ matters, never whether it is there. The weights were fitted once, to the recordi
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -105,16 +104,3 @@ class Score:
     def probability(self) -> float:
         """The same as a probability."""
         return float(expit(self.log_odds))
-
-
-def beside_best(scores: Sequence[Score]) -> dict[tuple[str, ...], float]:
-    """Log odds, against nothing more, of effects of which one at most is there.
-
-    Of each by itself, and no more than its share of the greatest evidence has in the log odds of that: the
-    likelihood is tempered by so much as what the best one explains may be our own law's error, and no more.
-    """
-    if not scores:
-        return {}
-    best = max(scores, key=lambda s: s.evidence)
-    share = max(best.log_odds, 0.0) / max(best.evidence, 1.0)
-    return {(s.name,): min(s.log_odds, share * s.evidence) if share else s.log_odds for s in scores}

@@ -7,10 +7,10 @@ odds of each against nothing more are that step's posterior; along the steps the
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit, softmax
+from scipy.special import softmax
 
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.leave_one_out import JudgedSet
@@ -32,13 +32,11 @@ class Explanation:
 @dataclass(frozen=True)
 class Choice:
     """One step: log odds, against nothing more, of what may be there beside what is chosen, and what was
-    taken (() where nothing was). certain: it is known from elsewhere. beside: log odds of what was taken once
-    another is there, by that other."""
+    taken (() where nothing was). certain: it is known from elsewhere."""
 
     log_odds: Mapping[Names, float]
     taken: Names
     certain: bool = False
-    beside: Mapping[Names, float] = field(default_factory=dict)
 
     def probabilities(self) -> dict[Names, float]:
         """Of each, and of nothing more."""
@@ -51,20 +49,15 @@ class Choice:
 def posterior(choices: Sequence[Choice], found: Names) -> tuple[Explanation, ...]:
     """Every set of causes that was weighed, the likeliest first.
 
-    found: the names that the last step's set was put back to. What stands beside a choice that was not taken,
-    but for what was, is not weighed: its set stands for all that hold it.
+    found: the names that the last step's set was put back to. What stands beside a choice that was not taken
+    is not weighed: its set stands for all that hold it.
     """
     sets: list[Explanation] = []
     reached: Names = ()
     left = 1.0
     for choice in choices:
         each = choice.probabilities()
-        for names, probability in each.items():
-            if names == choice.taken:
-                continue
-            both = float(expit(choice.beside.get(names, -np.inf)))
-            sets.append(Explanation((*reached, *names), left * probability * (1 - both)))
-            sets.append(Explanation((*reached, *choice.taken, *names), left * probability * both))
+        sets += [Explanation((*reached, *n), left * p) for n, p in each.items() if n != choice.taken]
         left *= each[choice.taken]
         reached = (*reached, *choice.taken)
         if not choice.taken:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def plans() -> list[Plan]:
     return [*once, *dragged, Plan(0.8, 0.02, 0.3, 0.0, 2)]
 
 
-def proposed(search: Search, found: Attribution, candidates: list[str]) -> NextTouch | None:
+def proposed(search: Search, found: Attribution, candidates: Sequence[str]) -> NextTouch | None:
     """The press that best separates the two explanations that are closest; None where there are not two."""
     for scores, name in zip(found.steps, found.picked, strict=False):
         rival = next((c for c in candidates if c in scores and c != name), None)

@@ -30,13 +30,12 @@ SOLVED = table(
 )
 SOLVED_PLACES = table({"unsolved_places": COUNT, "places": many(SOLVED)})
 
-_VERDICT = table(
-    {
-        "kind": one_of(("none", "effect", "ambiguous", "unknown", "effect+unknown")),
-        "effects": TEXTS,
-        "candidates": TEXTS,
-    }
-)
+_SAID = {
+    "kind": one_of(("none", "effect", "ambiguous", "unknown", "effect+unknown")),
+    "effects": TEXTS,
+    "candidates": TEXTS,
+}
+_VERDICT = table({**_SAID, "explanations": many(table({"effects": TEXTS, "probability": SHARE}))})
 COMPARE_MODELS = table(
     {
         "palpations": COUNT,
@@ -66,7 +65,7 @@ _SIDE = table(
         "young_modulus_pa": NUMBER,
         "young_modulus_ci95_pa": many(MAYBE, 2),
         "beside_effects_pa": NUMBER,
-        "verdict": or_null(_VERDICT),
+        "verdict": or_null(table(_SAID)),
     }
 )
 COMPARE_RECORDINGS = table(
@@ -106,7 +105,6 @@ _EFFECT = table(
         "parameters": named(ANYTHING),
         "parameters_ci95": named(ANYTHING),
         "odds": MAYBE,
-        "confidence_set_p": MAYBE,
         "detectable_n": MAYBE,
         "size_n": MAYBE,
     }

@@ -27,17 +27,6 @@ def test_sets_of_one_and_two_causes_hold_the_whole_posterior():
     assert names_of(likeliest(found, 0.9)) == ("base", "delay", "skin")
 
 
-def test_the_second_of_two_is_weighed_beside_either_first():
-    """A skin explains as much as Poisson's ratio by itself, and with it there Poisson's ratio is too."""
-    first = Choice({("nu",): 3.0, ("skin",): 3.0}, ("nu",), beside={("skin",): np.log(9)})
-    found = posterior([first, Choice({("skin",): np.log(9)}, ("skin",))], ("nu", "skin"))
-    each = {frozenset(e.effects): e.probability for e in found}
-    alone = np.exp(3.0) / (1 + 2 * np.exp(3.0))
-    assert each[frozenset({"nu", "skin"})] == pytest.approx(2 * 0.9 * alone)
-    assert each[frozenset({"skin"})] == pytest.approx(0.1 * alone)
-    assert each[frozenset({"nu"})] == pytest.approx(0.1 * alone)
-
-
 def test_what_is_known_from_elsewhere_is_in_every_set():
     found = posterior([Choice({}, ("play",), certain=True), Choice({("base",): 0.0}, ())], ("play",))
     assert {e.effects: e.probability for e in found} == pytest.approx({("play",): 0.5, ("play", "base"): 0.5})

@@ -132,7 +132,7 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
         "in ten together. How evidence counts was learnt from simulated recordings whose truth is known."
     )
     if len(sure) == 1:
-        return question, f"{percent(*sure.values())} sure", text
+        return question, f"{percent(sum(sure.values()))} sure", text
     each = ", ".join(f"{spaced(name)} {percent(share)}" for name, share in sure.items())
     return question, begun(each), text
 
