@@ -194,7 +194,7 @@ def attribute(
             search, [s for s in scores.values() if of_one_phenomenon(s.effect, [best.effect])], best
         )
         chosen.append(best.name)
-        others = {n: x for n, x in log_odds.items() if not of_one_phenomenon(scores[n[0]].effect, best.added)}
+        others = {n: x for n, x in log_odds.items() if _another(scores[n[0]], best)}
         choice = Choice({**others, (best.name,): best.log_odds}, (best.name,), certain=bool(known))
         choices.append(_told_apart(search, choice, scores, best))
         search.renew(best.candidate.found)
@@ -210,6 +210,12 @@ def attribute(
         base, ideal, deep, steps[0], order, current, posterior(choices, order), tuple(steps),
         taken, strain_gain, strain_closes,
     )  # fmt: skip
+
+
+def _another(score: Score, best: Score) -> bool:
+    """Whether a score may be instead of the best: of another phenomenon, and not the best in a wider form."""
+    wider = score.effect.hints.any_form and best.effect.scope.between_places and score.gain < best.gain
+    return not (wider or of_one_phenomenon(score.effect, best.added))
 
 
 def _told_apart(search: Search, choice: Choice, scores: dict[str, Score], best: Score) -> Choice:

@@ -14,6 +14,8 @@ from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 _BLOCKS = 8
 _SHIFTS = np.linspace(-0.1, 0.1, 401)
 """Of first touch, in shares of the depth: finer than what tells one law from another."""
+_RESTS, _ENDS = 0.97, 5
+"""Share of the depth down to which a tip rests, and rows at either end of it that tell the force."""
 SURE_PULL = 5.0
 """Standard deviations of the noise that a pull must exceed: no noise reaches so far in some thousand rows."""
 
@@ -26,7 +28,9 @@ class Approach:
     error: dent law (and 'hunt-crossley', 'regression', 'constant') -> rms error over rms force, median of
     the curves. law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does
     not come back (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out, 0 where noise
-    alone reaches so far. first: law's shift of the first curve's first touch, m in a hand's size.
+    alone reaches so far. fades: share of the force that is gone at the end of a rest at depth, median of the
+    curves that rest (0 where noise alone does so). first: law's shift of the first curve's first touch, m in
+    a hand's size.
     """
 
     error: dict[str, float]
@@ -34,6 +38,7 @@ class Approach:
     modulus_pa: np.ndarray
     hysteresis: float
     pull_n: np.ndarray
+    fades: float
     first: float = 0.0
 
 
@@ -43,7 +48,7 @@ def approach_of(bench: Bench) -> Approach:
     errors: dict[str, list[float]] = {}
     moduli: dict[str, list[float]] = {}
     shifts: dict[str, list[float]] = {}
-    work, pull = [], []
+    work, pull, fades = [], [], []
     for part in presses.parts:
         u, push = presses.depth[part], presses.push[part]
         top = int(np.argmax(push))
@@ -61,13 +66,19 @@ def approach_of(bench: Bench) -> Approach:
         # a curve that ends in its hold gives nothing back to be weighed
         gone = 1 + trapezoid(push[back], u[back]) / given
         work.append(gone if u[part.stop - part.start - 1] < 0.5 * u.max() else np.nan)
+        rest = top + int(np.argmax(np.append(u[top:] < _RESTS * u[top], True)))
+        noise = white_noise_std(push[:, None])
+        if rest - top > 2 * _ENDS:
+            begun, ended = (float(np.median(x)) for x in (push[top:rest][:_ENDS], push[top:rest][-_ENDS:]))
+            fades.append((begun - ended) / begun if begun - ended > SURE_PULL * noise else 0.0)
         pulls = -float(push[top:].min())
-        sure = pulls > SURE_PULL * white_noise_std(push[:, None])
+        sure = pulls > SURE_PULL * noise
         pull.append((pulls if sure else 0.0) / bench.similarity.force)
     medians = {name: float(np.median(values)) for name, values in errors.items()}
     law = min(tip.laws, key=lambda name: medians[name])
     own = np.array(moduli[law]) / bench.similarity.modulus
-    return Approach(medians, law, own, float(np.median(work)), np.array(pull), shifts[law][0])
+    faded = float(np.median(fades or [0.0]))
+    return Approach(medians, law, own, float(np.median(work)), np.array(pull), faded, shifts[law][0])
 
 
 def _blocks(count: int) -> np.ndarray:

@@ -49,6 +49,8 @@ _TOUCHES = (0.0, 0.2, 0.5)
 _TURNS, _STEP = 30, 1e-4
 _DECADES = 6 * np.log(10)
 """How far ln E is looked for: a machine that takes all leaves it open."""
+_TOLD = (-100.0, 100.0)
+"""Of ln E, where a curve leaves it open."""
 JKR = "jkr"
 NAMED = 0.9
 """Probability from which a machine that yields is named: nine to one."""
@@ -380,7 +382,7 @@ def _weighed(tried: Sequence[_Tried], every: np.ndarray, curves: int) -> Elastic
     near = np.clip(np.searchsorted(every, np.arange(curves), side="right") - 1, 0, len(every) - 1)
     return Elastic(
         modulus_pa=float(np.exp(middle)),
-        interval_pa=(float(np.exp(low)), float(np.exp(high))),
+        interval_pa=tuple(np.exp(np.clip([low, high], *_TOLD)).tolist()),
         yields=chance,
         stiffness_n_per_m=float(stiff[1]),
         stiffness_ci95_n_per_m=(float(stiff[2]), float(stiff[0])),

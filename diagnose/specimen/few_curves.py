@@ -45,6 +45,8 @@ _LOOP = (
     "a loop so wide, or a force that fades while the tip rests, is creep, a late force or play: press more "
     "slowly and hold to separate them; a slow press may be as much softer as the interval says"
 )
+_FADES = 0.05
+"""Share of the force that may be gone at the end of a rest in a sample whose ways in are elastic."""
 _READ = 0.01
 """Standard deviation of ln E that no curve tells of: how true a load cell, a travel and a tip are."""
 _FEW = "fewer than 6 curves: none can be held out, so no effect of the material is named"
@@ -86,8 +88,10 @@ def material_of_few(
     assert tip is not None
     if tip.form == "punch":
         notes.append(_STRAIGHT)
-    lost = approach.hysteresis if approach.hysteresis > _WIDE else 0.0
-    if lost:
+    loop = approach.hysteresis if approach.hysteresis > _WIDE else 0.0
+    lost = max(loop, approach.fades if approach.fades > _FADES else 0.0)
+    creeps = lost > 0
+    if creeps:
         notes.append(_LOOP)
     modulus = elastic.modulus_pa
     made = Material(
@@ -101,28 +105,30 @@ def material_of_few(
         error={**approach.error, elastic.law: elastic.missed},
         verdict=f"{elastic.law} follows the way in best; {gone}",
         parameters={"onset_m": bench.onset_m[bench.used].tolist()},
-        notes=(*notes, *elastic_notes(elastic)),
+        notes=(*notes, *elastic_notes(elastic, creeps)),
         unknown=(*INDENTATION_UNKNOWN, "which effect"),
         odds=tests.odds,
         seen=seen_of_few(bench, elastic),
     )
-    made = with_machine(made, elastic)
+    made = made if creeps else with_machine(made, elastic)
     more = _NO_SPHERE if tip.form != "sphere" else _FEW if tests.timed else _NO_TIME
     return replace(made, notes=(*made.notes, more))
 
 
-def elastic_notes(elastic: Elastic) -> tuple[str, ...]:
-    """What else the ways in may be, and where the modulus would be then."""
+def elastic_notes(elastic: Elastic, creeps: bool = False) -> tuple[str, ...]:
+    """What else the ways in may be, and where the modulus would be then. creeps: what yields with time may be
+    the sample, so a machine that does is not named."""
     notes = []
     sticky = elastic.laws.get(JKR, 0.0)
     if sticky > 1 - NAMED:
         share = f"{100 * sticky:.3g} %"
         notes.append(f"the sample pulls at the tip as by JKR (probability {share}), which the modulus counts")
-    if 1 - NAMED < elastic.yields <= NAMED:
+    if 1 - NAMED < elastic.yields <= (1.0 if creeps else NAMED):
         notes.append(
             f"a machine that yields by {elastic.stiffness_n_per_m / 1e3:.3g} N/mm may be in it (probability "
-            f"{100 * elastic.yields:.2g} %): the modulus would be {elastic.yielding_pa:.4g} Pa, and the "
-            "interval reaches there; press something rigid to know it"
+            f"{100 * elastic.yields:.3g} %{', of an elastic sample' * creeps}): the modulus would be "
+            f"{elastic.yielding_pa:.4g} Pa by it and {elastic.rigid_pa:.4g} Pa without, and the interval "
+            "reaches there; press something rigid to know it"
         )
     return tuple(notes)
 

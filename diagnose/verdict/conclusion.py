@@ -209,10 +209,11 @@ def entries_of(
         )  # fmt: skip
     if found.finite_strain_gain > -search.options.beyond_doubt or strain.name in answer.names:
         left = gap(found.deep.plain, counts, added)
+        there = (1 - WEIGHTS.lapse) * float(expit(found.finite_strain_gain))
         closed, interval = closed_by(found.deep.plain, draws)
         entries.append(
             EffectEntry(
-                strain.name, strain.domain, float(expit(found.finite_strain_gain)), left, closed, interval,
+                strain.name, strain.domain, there, left, closed, interval,
                 {},
                 found.finite_strain_gain, size_n=felt(found.deep.residual - found.ideal.residual),
             )
@@ -228,7 +229,7 @@ def entries_of(
         )  # fmt: skip
     for rest in (effect(n) for n in answer.names if effect(n).role is Role.REST):
         left = gap(found.final.plain, counts, added)
-        there = float(expit(WEIGHTS.log_odds(answer.shape_gain)))
+        there = (1 - WEIGHTS.lapse) * float(expit(WEIGHTS.log_odds(answer.shape_gain)))
         entries.append(EffectEntry(rest.name, rest.domain, there, left, 0.0, None, {}))
     entries = [dataclasses.replace(e, intervals=widened(e.name, e.parameters, e.intervals)) for e in entries]
     place = {n: i for i, n in enumerate(answer.names)}

@@ -28,9 +28,10 @@ class SearchHints:
     candidates(): start vectors, where the parameters' own are not enough. seek(scene, misfit): start vectors
     found from the data. refine(scene, values): makes its law exact near a fit.
     few_places: it lives in few places, so the one that speaks loudest counts, and the shape may be its rival.
-    any_form: it can take the form of others that differ from place to place. slips: it caps the sideways
-    force, where a fit that trusts the stick may go wrong. by_first_touches: it shows by them alone, and not
-    where another effect moved them or the surface was fitted to them.
+    any_form: it can take the form of others that differ from place to place, so it is no rival of one of them
+    that gains more. slips: it caps the sideways force, where a fit that trusts the stick may go wrong.
+    by_first_touches: it shows by them alone, and not where another effect moved them or the surface was
+    fitted to them.
     hides_strain: it bends force against depth the other way than finite strain, so neither shows alone.
     stands_for_strain: once it is named, finite strain may have been taken for it. expensive: a quick
     diagnosis leaves it out.

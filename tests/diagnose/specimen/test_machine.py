@@ -137,6 +137,26 @@ def test_a_loop_of_creep_widens_the_interval_down_to_the_lasting_modulus_and_is_
     assert depth.max() == pytest.approx(1e-3, rel=0.05)
 
 
+def test_a_sample_that_fades_while_the_tip_rests_is_no_machine_that_yields():
+    """A relaxing sphere contact of 20 kPa that ends in its hold: the ways in bend as a machine's would."""
+    given = []
+    for k, speed in enumerate((1e-3, 3e-3)):
+        t = np.arange(0.0, 0.3 + 2e-3 / speed + 0.5, 5e-3)
+        dent = speed * np.clip(t - 0.3, 0, 2e-3 / speed)
+        elastic = 4 / 3 * 20e3 / (1 - 0.49**2) * np.sqrt(RADIUS) * dent**1.5
+        memory, force = 0.0, elastic.copy()
+        for i in range(1, len(t)):
+            memory = np.exp(-5e-3 / 0.3) * memory + 0.3 * (elastic[i] - elastic[i - 1])
+            force[i] += memory
+        noise = np.random.default_rng(k).normal(0, 5e-5, len(t))
+        given.append(MachineCycle(t, dent + speed * np.minimum(t - 0.3, 0), force + noise, f"{k}", None))
+    found = material(given)
+    assert found.effects == () and "yields" not in found.verdict
+    assert any("may be in it" in note for note in found.notes)
+    low, high = found.young_modulus_ci95_pa
+    assert low < 20e3 < high
+
+
 def test_parameters_are_written_as_people_write_them():
     assert in_words("tool_compliance", {"stiffness_n_per_m": 64e3}) == "stiffness 64 N/mm"
     words = in_words("viscoelasticity", {"g": [0.3, 0.2], "tau_s": [0.5, 20.0]})
