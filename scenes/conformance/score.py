@@ -25,13 +25,14 @@ class Refused(Exception):
 
 
 def table(path, columns):
-    """(n, columns) numbers of a CSV with that header."""
+    """(n, columns) numbers of a CSV whose header begins with these; further columns are passed over."""
     try:
         lines = path.read_text(encoding="utf-8-sig").split("\n")
     except (OSError, UnicodeDecodeError) as error:
         raise Refused(f"'{path}' cannot be read ({error})") from error
     head = [word.strip() for word in lines[0].strip().split(",")]
-    if head != columns.split(","):
+    width = len(columns.split(","))
+    if head[:width] != columns.split(","):
         raise Refused(f"'{path}' begins with '{lines[0].strip()[:60]}': its first line must be {columns}")
     rows = []
     for number, line in enumerate(lines[1:], 2):
@@ -42,7 +43,7 @@ def table(path, columns):
                 row = []
             if len(row) != len(head):
                 raise Refused(f"'{path}', line {number}: it must be {len(head)} numbers, {columns}")
-            rows.append(row)
+            rows.append(row[:width])
     if not rows:
         raise Refused(f"'{path}' has no rows: it must hold {columns}")
     return np.array(rows)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from palpate.diagnosis.options import AttributionOptions
-from palpate.diagnosis.search.attribution import _with_strain, _without_idle
+from palpate.diagnosis.search.attribution import _told_apart, _with_strain, _without_idle
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.gaps import lower_closure
 from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.rivals import Choice
 from palpate.mechanics.effects.registry import effect
 
 
@@ -59,6 +60,28 @@ def test_a_closed_gap_without_evidence_names_nothing(search):
 def test_probabilities_grow_with_evidence():
     few, many = score("time_delay", [0.5] * 40), score("time_delay", [20.0] * 40)
     assert 0 < few.probability < many.probability < 1
+
+
+@pytest.mark.parametrize(
+    ("adds", "lacks", "left"),
+    [(-10.0, -10.0, 9.0), (-10.0, 9.5, -9.5), (2.0, 4.0, 8.0)],
+    ids=["the same", "leaves much to the best, adds nothing", "each adds something"],
+)
+def test_rivals_are_told_apart_by_what_each_adds_to_the_other(adds, lacks, left):
+    """Both gain much by themselves: odds of 10 and of 9 against nothing more."""
+    nu, skin = effect("poisson_ratio"), effect("skin_layer")
+    search = SimpleNamespace(reweighed=lambda found: search)
+    search.judge = lambda effects, like: SimpleNamespace(found=SimpleNamespace(effects=effects))
+    search.score = lambda added, new, old: SimpleNamespace(log_odds=adds if skin in added else lacks)
+    scores = {
+        e.name: SimpleNamespace(
+            added=(e,), log_odds=odds, candidate=SimpleNamespace(found=SimpleNamespace(effects=(e,)))
+        )
+        for e, odds in ((nu, 10.0), (skin, 9.0))
+    }
+    choice = Choice({(n,): s.log_odds for n, s in scores.items()}, (nu.name,))
+    found = _told_apart(search, choice, scores, scores[nu.name])
+    assert found.log_odds[(skin.name,)] == pytest.approx(left)
 
 
 def test_a_lump_that_one_place_alone_speaks_for_is_known_as_such():
