@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from palpate.operations.check import check as check
     from palpate.operations.compare import changes as changes
     from palpate.operations.compare import compare as compare
+    from palpate.operations.conformance import conformance as conformance
     from palpate.operations.diagnose import diagnose as diagnose
     from palpate.operations.export import export as export
     from palpate.operations.import_ import import_table as import_table

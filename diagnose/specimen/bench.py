@@ -50,13 +50,15 @@ UP = np.array([0.0, 0.0, 1.0])
 class MachineCycle:
     """One cycle of a machine: t (n,) s increasing, travel (n,) m into the sample from any zero, force (n,) N
     that pushes the tip out, from any level. name: of its file. level_n: what it reads in free air; None: what
-    the first rows read."""
+    the first rows read. own: the travel is the tip's, the instrument has taken off what its own spring does.
+    """
 
     t: np.ndarray
     travel: np.ndarray
     force: np.ndarray
     name: str = ""
     level_n: float | None = None
+    own: bool = False
 
 
 @dataclass(frozen=True)
@@ -245,7 +247,7 @@ def _levelled(curve: MachineCycle, pace: float) -> MachineCycle:
     t, travel, force = (
         v[: count * block].reshape(count, block).mean(axis=1) for v in (curve.t, curve.travel, curve.force)
     )
-    return MachineCycle(pace * (t - t[0]), travel, force, curve.name, curve.level_n)
+    return MachineCycle(pace * (t - t[0]), travel, force, curve.name, curve.level_n, curve.own)
 
 
 def _way_in(curve: MachineCycle) -> tuple[np.ndarray, np.ndarray, float] | None:

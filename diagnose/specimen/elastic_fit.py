@@ -260,7 +260,8 @@ def elastic_fit(
     peak = max(float(w.force[-1]) for w in ways)
     guess = tip.guess_modulus(deep, peak, poisson_ratio)
     names = [*tip.laws, *([JKR] if pull_n > 0 and tip.form == "sphere" else [])]
-    shares = _SHARES if tip.form != "punch" else _SHARES[:1]
+    rigid = tip.form == "punch" or all(curve.own for curve in curves)
+    shares = _SHARES[:1] if rigid else _SHARES
     tried = []
     for name in names:
         law = _Law(name, tip, poisson_ratio, deep, pull_n)

@@ -47,6 +47,8 @@ _LOOP = (
 )
 _FADES = 0.05
 """Share of the force that may be gone at the end of a rest in a sample whose ways in are elastic."""
+_MOST_LOST = 0.9
+"""Share of the work by which a loop moves the modulus, at most."""
 _READ = 0.01
 """Standard deviation of ln E that no curve tells of: how true a load cell, a travel and a tip are."""
 _FEW = "fewer than 6 curves: none can be held out, so no effect of the material is named"
@@ -153,8 +155,9 @@ def with_machine(made: Material, elastic: Elastic) -> Material:
 
 
 def _with_loop(lost: float, interval: tuple[float, float]) -> tuple[float, float]:
-    """The interval, Pa, of a modulus that a loop leaves open: it reaches down to what comes back."""
-    return (1 - lost) * interval[0], interval[1]
+    """The interval, Pa, of a modulus that a loop leaves open: it reaches down to what comes back. Where more
+    than all is lost, a tip that sticks is pulled off, which no modulus explains."""
+    return (1 - min(lost, _MOST_LOST)) * interval[0], interval[1]
 
 
 def _force(newtons: float) -> str:

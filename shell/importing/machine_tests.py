@@ -125,7 +125,7 @@ def _indentations(paths: list[Path], said_tip: SaidOfTip, said: SaidOfCurves) ->
         said_tip = replace(said_tip, form=said_tip.form or "sphere")
     for path in (p for p, own in zip(paths, chiaro, strict=True) if own):
         data = read_chiaro(path)
-        curves.append(MachineCycle(data.t, data.travel, data.force, path.name))
+        curves.append(MachineCycle(data.t, data.travel, data.force, path.name, own=True))
         said_tip = replace(said_tip, radius_m=said_tip.radius_m or data.tip_radius_m)
         heads.append(Header(modulus_pa=None if np.isnan(data.stated_modulus_pa) else data.stated_modulus_pa))
     said_tip = _of_files(said_tip, heads, notes)

@@ -14,7 +14,7 @@ from typing import Any
 from palpate.mechanics.progress import Progress, silent
 from palpate.output import Output, progress_bar
 
-_LOG = logging.getLogger("palpate.progress")
+_LOG = logging.getLogger("palpate").getChild("progress")
 Step = str | Callable[[], Sequence[str]]
 """What a command says: a line, or what makes lines when their turn comes."""
 

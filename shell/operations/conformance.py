@@ -27,7 +27,7 @@ def conformance(
     *,
     call: Call,
 ) -> Made:
-    """Write the kit by which anyone checks a soft-contact simulator.
+    """Write the kit by which anyone checks a soft-contact simulator: bodies and paths (m, s), forces (N).
 
     Raises FileError where something else than a kit is there, or it cannot be written.
     """

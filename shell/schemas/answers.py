@@ -14,6 +14,7 @@ from palpate.schemas.forms import (
     MAYBE,
     MAYBE_INTERVAL,
     NUMBER,
+    SHARE,
     TEXT,
     VECTOR,
     Form,
@@ -222,7 +223,15 @@ SERVO = table(
         "unsettled_ticks": COUNT,
     }
 )
-TOUCH = table({"scene": TEXT, "device": TEXT, "servo": SERVO})
+TOUCH = table(
+    {
+        "scene": TEXT,
+        "device": TEXT,
+        "servo": SERVO,
+        "table": table({"solved_share": SHARE, "whole": FLAG}, error_n=MAYBE, error_depth_m=MAYBE),
+    }
+)
+CONFORMANCE = table({"path": TEXT, "version": TEXT, "size_bytes": COUNT, "cases": TEXTS})
 DEMO = table(
     {
         "young_modulus_pa": NUMBER,
@@ -320,6 +329,7 @@ ANSWERS: dict[str, Form] = {
     "explore": EXPLORE,
     "simulate": SIMULATE,
     "bench": named(ANYTHING),
+    "conformance": CONFORMANCE,
     "batch": BATCH,
 }
 """By command; `calibrate` gives what TOOL.toml holds (`palpate.schemas.schema`)."""
