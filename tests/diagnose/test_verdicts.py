@@ -25,7 +25,7 @@ from palpate.reconstruction.presses_on_model import presses_on
 from palpate.show.demo import diagnosis_json, diagnosis_words
 from palpate.show.diagnosis.gaps import press_gaps
 from palpate.show.diagnosis.parameters import parameter_rows, short
-from palpate.show.diagnosis.words import verdict, where
+from palpate.show.diagnosis.words import short_verdict, verdict, where
 from palpate.words import force_words, spoken
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
@@ -95,6 +95,11 @@ def test_what_only_a_later_step_tried_has_its_numbers_too(delayed):
     entry = entries_of(findings, answer_of(findings, counts), gaps, counts, rng)[0]
     assert entry.name == "time_delay" and entry.parameters["delay_s"] == pytest.approx(0.02, abs=0.002)
     assert entry.gap_closed == pytest.approx(delayed[2].entries[0].gap_closed, abs=0.02)
+
+
+def test_what_may_be_there_is_no_verdict_where_nothing_is_named():
+    assert short_verdict("none", (), ("inclusion",)) == "none"
+    assert short_verdict("unknown", (), ("friction_slip",)) == "something unknown"
 
 
 def test_a_delay_below_zero_is_early(delayed):

@@ -217,7 +217,7 @@ def named(result: Diagnosis, name: str) -> str:
 def short_verdict(kind: str, effects: Sequence[str], candidates: Sequence[str]) -> str:
     """In a few words: 'viscoelasticity', 'force bias or force drift', 'none'."""
     said = [*map(spaced, effects), *(["something unknown"] if "unknown" in kind else [])]
-    if candidates and not said:
+    if candidates and not said and kind != "none":
         said = [spoken(candidates, "or")]
     return listed(said) or kind
 
