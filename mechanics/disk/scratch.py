@@ -16,10 +16,17 @@ OLD = "old-"
 _swept: set[Path] = set()
 
 
-def temporary_prefix(label: str = "") -> str:
-    """How the name of every temporary file or folder of this process begins."""
+def temporary_prefix(label: str = "", process: int | None = None) -> str:
+    """How the name of every temporary file or folder of a process begins, by default of this one."""
     host = zlib.crc32(socket.gethostname().encode(errors="replace")) & 0xFFFF
-    return f".palpate-{host:04x}-{os.getpid()}-{label}"
+    return f".palpate-{host:04x}-{os.getpid() if process is None else process}-{label}"
+
+
+def remove_left(folder: Path, process: int) -> None:
+    """Remove the temporary files that a process, which has ended, left in `folder` while it wrote."""
+    with suppress(OSError):
+        for left in folder.glob(temporary_prefix(process=process) + "*"):
+            left.unlink(missing_ok=True)
 
 
 def memory_folder() -> Path | None:

@@ -24,7 +24,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from palpate.child import module_command
-from palpate.mechanics.disk.scratch import memory_folder, temporary_prefix
+from palpate.mechanics.disk.scratch import memory_folder, remove_left, temporary_prefix
 from palpate.mechanics.errors import PalpateError
 from palpate.mechanics.progress import Progress, silent
 from palpate.render.options import RenderOptions
@@ -49,6 +49,7 @@ class FillingTable:
     """
 
     def __init__(self, model: Path, options: RenderOptions) -> None:
+        self._model = model
         self._folder = Path(tempfile.mkdtemp(prefix=temporary_prefix("filling-"), dir=memory_folder()))
         self.solved, self.error_n, self.depth_m = 0.0, float("nan"), float("nan")
         self.first = self.whole = False
@@ -112,6 +113,7 @@ class FillingTable:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        remove_left(self._model, self._process.pid)
         self._listener.join(1.0)
         shutil.rmtree(self._folder, ignore_errors=True)
 

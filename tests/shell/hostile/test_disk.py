@@ -11,7 +11,7 @@ import warnings
 import numpy as np
 import pytest
 
-from palpate.mechanics.disk.scratch import sweep, temporary_prefix
+from palpate.mechanics.disk.scratch import remove_left, sweep, temporary_prefix
 from palpate.mechanics.disk.store import read_arrays, write_arrays
 from palpate.mechanics.disk.writing import (
     JSON,
@@ -150,3 +150,11 @@ def test_atomic_writes_follow_links_and_leave_them(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert not [p for p in tmp_path.iterdir() if p.name.startswith(".palpate")]
+
+
+def test_what_an_ended_process_was_writing_is_removed_and_nothing_else(tmp_path):
+    ended, other = (tmp_path / (temporary_prefix(process=pid) + "table.bin") for pid in (41, 412))
+    for path in (ended, other, tmp_path / "model.toml"):
+        path.write_text("")
+    remove_left(tmp_path, 41)
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([other.name, "model.toml"])
