@@ -196,8 +196,8 @@ def attribute(
         chosen.append(best.name)
         others = {n: x for n, x in log_odds.items() if _another(scores[n[0]], best)}
         choice = Choice({**others, (best.name,): best.log_odds}, (best.name,), certain=bool(known))
-        choices.append(_told_apart(search, choice, scores, best))
         search.renew(best.candidate.found)
+        choices.append(_told_apart(search, choice, scores, best))
         current, strain_gain, strain_closes = _with_strain(search, best.candidate.found.effects)
     taken = tuple(chosen)[: len(steps)]
     current, chosen = _without_idle(search, chosen, current, seen)
@@ -222,20 +222,19 @@ def _told_apart(search: Search, choice: Choice, scores: dict[str, Score], best: 
     """The choice, with the odds of the likeliest others as they follow from the best and both together.
 
     Two effects that leave the same to each other are as likely; one that leaves much to the best, to which it
-    adds nothing, is not, whatever either gains by itself.
+    adds nothing, is not, whatever either gains by itself. search: weighs as things are at the best.
     """
     likely = sorted(choice.probabilities().items(), key=lambda item: -item[1])
     others = [n for n, p in likely if n and n != choice.taken and p > UNLIKELY][:MOST_TOLD_APART]
-    there = search.reweighed(best.candidate.found)
     odds = dict(choice.log_odds)
+    rest = [e for e in best.candidate.found.effects if e not in best.added]
     for names in others:
         other = scores[names[0]]
-        rest = [e for e in best.candidate.found.effects if e not in best.added]
-        alone = there.judge(best.candidate.found.effects, like=best.candidate)
-        instead = there.judge([*rest, *other.added], like=other.candidate)
-        both = there.judge([*alone.found.effects, *other.added], like=alone)
-        adds = there.score(other.added, both, alone).log_odds
-        lacks = there.score(best.added, both, instead).log_odds
+        alone = search.judge(best.candidate.found.effects, like=best.candidate)
+        instead = search.judge([*rest, *other.added], like=other.candidate)
+        both = search.judge([*alone.found.effects, *other.added], like=alone)
+        adds = search.score(other.added, both, alone).log_odds
+        lacks = search.score(best.added, both, instead).log_odds
         odds[names] = min(odds[names], best.log_odds + adds - lacks)
     return dataclasses.replace(choice, log_odds=odds)
 

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.spatial.distance import cdist
 
 from palpate.mechanics.compliance.fine_corners import less_half_space
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
+from palpate.mechanics.compliance.smooth_field import correlation, spacing
 from palpate.mechanics.errors import MeshError
-from palpate.mechanics.shape.nearest import closest
-from palpate.mechanics.statistics import matern_5_2
+from palpate.mechanics.shape.nearest import closest, farthest_apart
 
 PLACES = 200
 """By which a first table is made."""
@@ -46,7 +45,7 @@ class CoarseCompliance:
         self._far = less_half_space(
             solved.own[self.known], normals, float(self.poisson_ratio[0]), float(self.own_width_m[0])
         )
-        self._length_m = _LENGTH_IN_SPACINGS * _spacing(self.own_points[self.first])
+        self._length_m = _LENGTH_IN_SPACINGS * spacing(self.own_points[self.first])
         alike = _alike(points, normals, points, normals, self._length_m)
         alike[np.diag_indices(len(alike))] += _JITTER
         factor = cho_factor(alike)
@@ -103,29 +102,16 @@ class CoarseCompliance:
         return np.zeros((len(self.nodes), 3))
 
 
-def first_places(points: np.ndarray, most: int = PLACES) -> np.ndarray:
-    """(p,) ascending numbers of at most so many of points (v, 3), each the farthest from those before."""
-    if len(points) <= most:
-        return np.arange(len(points))
-    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
-    away = np.linalg.norm(points - points[chosen[0]], axis=1)
-    while len(chosen) < most:
-        chosen.append(int(np.argmax(away)))
-        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.sort(chosen)
-
-
-def _spacing(points: np.ndarray) -> float:
-    """m, median distance of points (q, 3) to their nearest neighbour."""
-    apart = cdist(points, points) + np.diag(np.full(len(points), np.inf))
-    return float(np.median(apart.min(axis=1)))
+def first_places(points: np.ndarray) -> np.ndarray:
+    """(p,) ascending numbers of at most PLACES of points (v, 3), each the farthest from those before."""
+    return np.sort(farthest_apart(points, PLACES))
 
 
 def _alike(
     a: np.ndarray, a_normals: np.ndarray, b: np.ndarray, b_normals: np.ndarray, length_m: float
 ) -> np.ndarray:
     """Correlation (n, k) of the far fields of places: near one another and facing alike."""
-    return matern_5_2(cdist(a, b), length_m) * (1 + a_normals @ b_normals.T) / 2
+    return correlation(a, b, length_m) * (1 + a_normals @ b_normals.T) / 2
 
 
 def _tensor(six: np.ndarray) -> np.ndarray:

@@ -22,6 +22,7 @@ from palpate.mechanics.elastic.elasticity import stiffness, triangle_mass
 from palpate.mechanics.elastic.floor import resting
 from palpate.mechanics.elastic.held_base import base_triangles
 from palpate.mechanics.frames import local_frames
+from palpate.mechanics.shape.nearest import farthest_apart
 from palpate.mechanics.shape.tetmesh import EDGES, TetMesh
 
 ANGLES = 8
@@ -107,14 +108,9 @@ def _corner_motion(mesh: TetMesh) -> tuple[np.ndarray, sp.csr_matrix]:
 def few_corners(plane: np.ndarray) -> tuple[np.ndarray, sp.csr_matrix]:
     """(chosen (r,), drawn (b, r)): at most MOST_CORNERS of points (b, 2), each farthest from those before,
     and by which weights their motion gives that of all: linear in triangles, and beyond them."""
-    count = len(plane)
-    if count <= MOST_CORNERS:
-        return np.arange(count), sp.identity(count, format="csr")
-    chosen = [int(np.argmax(np.linalg.norm(plane - plane.mean(axis=0), axis=1)))]
-    away = np.linalg.norm(plane - plane[chosen[0]], axis=1)
-    while len(chosen) < MOST_CORNERS:
-        chosen.append(int(np.argmax(away)))
-        away = np.minimum(away, np.linalg.norm(plane - plane[chosen[-1]], axis=1))
+    count, chosen = len(plane), farthest_apart(plane, MOST_CORNERS)
+    if len(chosen) == count:
+        return chosen, sp.identity(count, format="csr")
     mesh = Delaunay(plane[chosen])
     # (b, t, 3) weights of the corners of every triangle: a point belongs where none is negative, or least so
     two = np.einsum("tij,btj->bti", mesh.transform[:, :2], plane[:, None] - mesh.transform[:, 2])
@@ -122,7 +118,7 @@ def few_corners(plane: np.ndarray) -> tuple[np.ndarray, sp.csr_matrix]:
     inside = np.nan_to_num(weights.min(axis=2), nan=-np.inf).argmax(axis=1)
     rows = np.repeat(np.arange(count), 3)
     entries = (weights[np.arange(count), inside].ravel(), (rows, mesh.simplices[inside].ravel()))
-    return np.array(chosen), sp.csr_matrix(entries, shape=(count, len(chosen)))
+    return chosen, sp.csr_matrix(entries, shape=(count, len(chosen)))
 
 
 def _mass(mesh: TetMesh, corners: np.ndarray) -> np.ndarray:

@@ -11,6 +11,19 @@ def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
+def farthest_apart(points: np.ndarray, most: int) -> np.ndarray:
+    """(p,) numbers of at most so many of points (n, d), each the farthest from those before; the first lies
+    farthest from their mean."""
+    if len(points) <= most:
+        return np.arange(len(points))
+    chosen = [int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))]
+    away = np.linalg.norm(points - points[chosen[0]], axis=1)
+    while len(chosen) < most:
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return np.array(chosen)
+
+
 def neighbours(triangles: np.ndarray) -> np.ndarray:
     """(k, 3) the triangle across the edge from corner i to corner i+1; -1 where there is none."""
     k = len(triangles)

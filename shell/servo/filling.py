@@ -159,6 +159,7 @@ class _Tip(threading.Thread):
 
 
 def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tell: Any) -> None:
+    """Returns once the whole table is kept."""
     from palpate.mechanics.compliance.coarse_table import CoarseCompliance, first_places
     from palpate.mechanics.compliance.on_demand import OnDemandCompliance
     from palpate.mechanics.compliance.stored_compliance import load_or_condense, load_or_solve
@@ -173,12 +174,10 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
     model = read_model(model_path)
     solved = load_or_solve(model)
     if not isinstance(solved, OnDemandCompliance):
-        tell({"solved": 1.0, "error_n": 0.0, WHOLE: True})
         return
     first = first_places(solved.own_points)
     if len(solved.own_points) <= _FEW * len(first):
         load_or_condense(model, said)
-        tell({"solved": 1.0, "error_n": 0.0, WHOLE: True})
         return
     for start in range(0, len(first), _AT_ONCE):
         solved.solve(first[start : start + _AT_ONCE])
@@ -206,7 +205,6 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
         else:
             tell({"solved": done / len(solved.own)})
     load_or_condense(model)
-    tell({"solved": 1.0, "error_n": 0.0, WHOLE: True})
 
 
 def main(argv: list[str]) -> int:
@@ -225,6 +223,7 @@ def main(argv: list[str]) -> int:
     tip.start()
     try:
         _fill(Path(argv[1]), Path(argv[2]), options, tip, tell)
+        tell({"solved": 1.0, "error_n": 0.0, WHOLE: True})
     except PalpateError as error:
         tell({"error": str(error)})
         return 2

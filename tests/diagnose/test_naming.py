@@ -70,7 +70,7 @@ def test_probabilities_grow_with_evidence():
 def test_rivals_are_told_apart_by_what_each_adds_to_the_other(adds, lacks, left):
     """Both gain much by themselves: odds of 10 and of 9 against nothing more."""
     nu, skin = effect("poisson_ratio"), effect("skin_layer")
-    search = SimpleNamespace(reweighed=lambda found: search)
+    search = SimpleNamespace()
     search.judge = lambda effects, like: SimpleNamespace(found=SimpleNamespace(effects=effects))
     search.score = lambda added, new, old: SimpleNamespace(log_odds=adds if skin in added else lacks)
     scores = {
