@@ -27,11 +27,12 @@ from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.gaps import beside_modulus_n
 from palpate.diagnosis.search.limits import detectable, forms_of
 from palpate.diagnosis.search.rivals import of_one_phenomenon
-from palpate.diagnosis.search.whiten import nuisance_columns
+from palpate.diagnosis.search.whiten import Whitener, nuisance_columns
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.files import read_model
+from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.recording.recording import read_recording
 from palpate.reconstruction.pipeline import reconstruct_fully
 from palpate.scenes.embedded import embedded_recording
@@ -54,8 +55,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Draw, judge, count."""
     recording = read_recording(arguments.recording or embedded_recording())
     model = read_model(arguments.model) if arguments.model else reconstruct_fully(recording).model
-    found = diagnose(recording, model, DiagnoseOptions(fast=arguments.fast, bootstrap=100)).findings
-    tried = [s.effect for s, _ in found.found.scored.values()]
+    options = DiagnoseOptions(fast=arguments.fast, bootstrap=100)
+    found: Findings = diagnose(recording, model, options).findings
+    tried = [s.effect for s in found.found.scored.values()]
     limits = detectable(found.search, found.found.base, tried)
     names = arguments.effects or [n for n, limit in limits.items() if np.isfinite(limit)]
     rng = np.random.default_rng(arguments.seed)
@@ -120,7 +122,7 @@ def _named(
     for level, column in columns[1:]:  # the first is the first touch's
         drawn = rng.normal(size=len(t))[t.press if level == "press" else t.site[t.press]]
         force += drawn[:, None] * column
-    force += (np.sqrt(whitener.variance) * whitener.louder)[:, None] * rng.normal(size=force.shape)
+    force += _noise(t, whitener, rng)
     forward = copy.copy(found.forward)
     forward.touches = dataclasses.replace(t, force=np.einsum("nji,nj->ni", t.frame[t.press], force))
     search = Search(
@@ -131,3 +133,15 @@ def _named(
     misfit = misfit_of(forward, fitted.found, found.site_sd)
     search.starts = {e.name: e.hints.seek(forward, misfit) for e in tried if e.hints.seek is not None}
     return attribute(search, tried).chosen
+
+
+def _noise(t: Presses, whitener: Whitener, rng: np.random.Generator) -> np.ndarray:
+    """(n, 3) N: of each sample's variance, and held for as many samples as it adds up over along a press."""
+    drawn = np.zeros((len(t.t), 3))
+    for part in t.parts:
+        own = whitener.sample_variance[part]
+        adds_up = whitener.variance * whitener.louder[part] ** 2
+        held = max(1, round(float((adds_up / own).mean())))
+        steps = rng.normal(size=(len(own) // held + 1, 3))
+        drawn[part] = np.sqrt(own)[:, None] * np.repeat(steps, held, axis=0)[: len(own)]
+    return drawn
