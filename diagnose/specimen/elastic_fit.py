@@ -20,13 +20,9 @@ from scipy.interpolate import PchipInterpolator
 from scipy.special import ndtr
 
 from palpate.diagnosis.specimen.bench import MachineCycle, touched
-from palpate.diagnosis.specimen.machine_compliance import BLOCKS
+from palpate.diagnosis.specimen.way_in import JKR, DentLaw, WayFit, WayFitted, lasting, way_of
 from palpate.mechanics.contact.tip import Tip
 
-_BINS, _CURVES = 120, 10
-"""Readings of a way in, and curves, that are fitted: means of rows, curves spread over all."""
-_AIR = 1.0
-"""Of the depth: how far before the touch free air counts."""
 _SHARES = np.array(
     [0, 0.01, 0.03, 0.06, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.93, 0.98]
 )
@@ -37,37 +33,21 @@ _SLOPES = 0.1
 """Standard deviation of a slope, where free air slopes: of the peak over the depth."""
 _APART = np.geomspace(0.002, 2.0, 14)
 """Standard deviations of ln E between curves, where they differ: each factor as often."""
-_PULLS, _MOST = 0.1, 1.0
-"""Standard deviation of the log of a pull about the one that was read on the way out, and its limit."""
+_CURVES = 10
+"""Curves that are fitted, spread over all."""
+_PULLS = 0.1
+"""Standard deviation of the log of a pull about the one that was read on the way out."""
 _LEAST = 3e-4
 """Of the force: errors of tables and travels, where a curve has no noise."""
-_TABLE, _DEEPEST = 600, 3.0
 _FINE, _EVEN, _UNLIKELY = 6000, 200, 25.0
 """Steps of the share where it is looked for, and where it is likely: within so many nats of the likeliest."""
-_TOUCHES = (0.0, 0.2, 0.5)
-"""Of the depth after the touch that was told."""
-_TURNS, _STEP = 30, 1e-4
-_DECADES = 6 * np.log(10)
-"""How far ln E is looked for: a machine that takes all leaves it open."""
 _TOLD = (-100.0, 100.0)
 """Of ln E, where a curve leaves it open."""
-JKR = "jkr"
 NAMED = 0.9
 """Probability from which a machine that yields is named: nine to one."""
 ALL = 0.95
 """A machine that takes this share of the travel in contact leaves too little to tell a modulus by: the dent
 is then no greater than what law, zero and tip are known by."""
-
-
-@dataclass(frozen=True)
-class _Way:
-    """Readings (b,) of one way in: travel m from the first touch as it was told, force N over the level;
-    weight: rows a reading is the mean of. level: whether it is fitted."""
-
-    travel: np.ndarray
-    force: np.ndarray
-    weight: float
-    level: bool
 
 
 @dataclass(frozen=True)
@@ -110,128 +90,7 @@ class Elastic:
         return self.machine and self.share > ALL
 
 
-class _Law:
-    """One law of the dent at any modulus: (dent, force) tables that grow."""
-
-    def __init__(self, name: str, tip: Tip, poisson_ratio: float, deepest_m: float, pull_n: float) -> None:
-        self.name, self.tip, self.nu, self.pull = name, tip, poisson_ratio, pull_n
-        self.deepest = deepest_m
-        self.dent = np.linspace(0.0, 1.0, _TABLE) ** 2 * _DEEPEST * deepest_m
-        if name != JKR:
-            self.unit = np.maximum.accumulate(tip.force(name, self.dent, 1.0, poisson_ratio))
-
-    def at(self, modulus: float, pull: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """(dent m, force N), of the way in; pull: over the one that was read."""
-        if self.name != JKR:
-            return self.dent, modulus * self.unit
-        plane, radius = modulus / (1 - self.nu**2), float(self.tip.radius_m or 0.0)
-        top = 4 / 3 * plane * np.sqrt(radius) * (_DEEPEST * self.deepest) ** 1.5
-        pull = pull * self.pull
-        push = -pull + (top + pull) * np.linspace(0.0, 1.0, _TABLE) ** 2
-        hertz = push + 2 * pull + 2 * np.sqrt(pull * (push + pull))
-        a = np.cbrt(0.75 * radius * hertz / plane)
-        dent = a**2 / radius - np.sqrt(4 * pull * a / (3 * radius * plane))
-        kept = dent > 0  # in contact on the way in
-        return np.append(0.0, dent[kept]), np.append(push[kept][0], push[kept])
-
-
-@dataclass(frozen=True)
-class _Fitted:
-    """values: log E, touch m, slope (peak over depth), level (peak), log of the pull over the one that was
-    read, of those that are fitted; covariance over the variance; squares and residuals, weighed."""
-
-    values: np.ndarray
-    covariance: np.ndarray
-    squares: float
-    left: np.ndarray
-
-
-class _Fit:
-    """One way in by one law, its free air flat or sloped."""
-
-    def __init__(self, way: _Way, law: _Law, sloped: bool, deep: float, peak: float, guess: float) -> None:
-        self.low = float(np.log(guess)) - _DECADES / 2
-        self.way, self.law, self.sloped, self.deep, self.peak = way, law, sloped, deep, peak
-        self.root = np.sqrt(way.weight)
-        columns = [way.travel / deep * peak] * sloped + [np.full(len(way.travel), peak)] * way.level
-        self.air = np.array(columns).reshape(len(columns), len(way.travel)).T
-
-    def start(self, share: float) -> np.ndarray:
-        """Values to begin with: the best of some first touches, as a slope may have been taken for one."""
-        rest = np.zeros(self.air.shape[1] + (self.law.name == JKR))
-        begun = [np.append([self.low + _DECADES / 2, each * self.deep], rest) for each in _TOUCHES]
-        return min((self.at(share, each) for each in begun), key=lambda found: found.squares).values
-
-    def curve(self, values: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:
-        """(travel of dent and machine m, force N)."""
-        pull = float(np.exp(np.clip(values[-1], -_MOST, _MOST))) if self.law.name == JKR else 1.0
-        dent, force = self.law.at(float(np.exp(values[0])), pull)
-        return dent + share * self.deep / self.peak * (force - force[0]), force
-
-    def push(self, values: np.ndarray, share: float, step: float = 0.0) -> np.ndarray:
-        """(n,) N of the dent, at a step beyond the travel."""
-        along, force = self.curve(values, share)
-        u = self.way.travel - values[1]
-        return np.where(u > 0, np.interp(np.maximum(u + step, 0.0), along, force), 0.0)
-
-    def left(self, values: np.ndarray, share: float) -> np.ndarray:
-        """(n,) N, weighed."""
-        rest = self.air @ values[2 : 2 + self.air.shape[1]]
-        return self.root * (self.way.force - self.push(values, share) - rest)
-
-    def _jacobian(self, values: np.ndarray, share: float) -> np.ndarray:
-        push, step = self.push(values, share), _STEP * self.deep
-        steep = (self.push(values, share, step) - self.push(values, share, -step)) / (2 * step)
-
-        def by(k: int) -> np.ndarray:
-            more = values.copy()
-            more[k] += _STEP
-            return (self.push(more, share) - push) / _STEP
-
-        pulled = [by(-1)] if self.law.name == JKR else []
-        return self.root * np.column_stack([by(0), -steep, self.air, *pulled])
-
-    def at(self, share: float, values: np.ndarray, seen: np.ndarray | None = None) -> _Fitted:
-        """Least squares (Levenberg and Marquardt) of one share. seen: (n,) 1 for readings that count."""
-        kept = np.ones(len(self.way.force)) if seen is None else seen
-        left = kept * self.left(values, share)
-        squares, damping = float(left @ left), 1e-3
-        jacobian = kept[:, None] * self._jacobian(values, share)
-        for _ in range(_TURNS):
-            normal = jacobian.T @ jacobian
-            damped = normal + damping * np.diag(np.diag(normal) + 1e-300)
-            step = np.linalg.solve(damped, jacobian.T @ left)
-            step[0] = min(max(step[0], -1.0, self.low - values[0]), 1.0, self.low + _DECADES - values[0])
-            tried = kept * self.left(values + step, share)
-            better = float(tried @ tried)
-            if better < squares:
-                gain = squares - better
-                values, left, squares, damping = values + step, tried, better, max(damping / 5, 1e-12)
-                jacobian = kept[:, None] * self._jacobian(values, share)
-                if gain < 1e-6 * squares:
-                    break
-            else:
-                damping *= 10
-                if damping > 1e6:
-                    break
-        scale = np.sqrt(np.maximum((jacobian**2).sum(axis=0), 1e-40))
-        own, ways = np.linalg.eigh((jacobian / scale).T @ (jacobian / scale))
-        inverse = (ways / np.maximum(own, 1e-10)) @ ways.T
-        return _Fitted(values, inverse / np.outer(scale, scale), squares, left)
-
-    def left_out(self, share: float, values: np.ndarray) -> tuple[float, float]:
-        """(squares N^2 of blocks of force that were left out, squares of the force), in contact."""
-        force, top = self.way.force, float(self.way.force.max())
-        block = np.where(force > 0, np.minimum(force / top * BLOCKS, BLOCKS - 1), -1).astype(int)
-        missed = np.zeros(len(force))
-        for k in range(BLOCKS):
-            again = self.at(share, values, (block != k).astype(float))
-            missed[block == k] = (self.left(again.values, share) / self.root)[block == k]
-        contact = block >= 0
-        return float((missed[contact] ** 2).sum()), float((force[contact] ** 2).sum())
-
-
-_Row = tuple[float, list[_Fitted]]
+_Row = tuple[float, list[WayFitted]]
 """A share of the machine, and each way's fit."""
 
 
@@ -255,7 +114,7 @@ def elastic_fit(
     """curves, with a contact each; onset_m: (c,) m, about where each touches. pull_n: N, greatest pull on the
     way out, 0 for none."""
     every = np.arange(len(curves))[:: max(1, -(-len(curves) // _CURVES))]
-    ways = [_way(curves[k], float(onset_m[k])) for k in every]
+    ways = [way_of(curves[k], float(onset_m[k])) for k in every]
     deep = max(float(w.travel[-1]) for w in ways)
     peak = max(float(w.force[-1]) for w in ways)
     guess = tip.guess_modulus(deep, peak, poisson_ratio)
@@ -264,34 +123,18 @@ def elastic_fit(
     shares = _SHARES[:1] if rigid else _SHARES
     tried = []
     for name in names:
-        law = _Law(name, tip, poisson_ratio, deep, pull_n)
+        law = DentLaw(name, tip, poisson_ratio, deep, pull_n)
         for sloped in (False, True):
-            fits = [_Fit(way, law, sloped, deep, peak, guess) for way in ways]
+            fits = [WayFit(way, law, sloped, deep, peak, guess) for way in ways]
             tried.append(_Tried(fits, _along(fits, shares)))
     return _weighed(tried, every, len(curves))
-
-
-def _way(curve: MachineCycle, onset: float) -> _Way:
-    """Of a curve, the rows from some air to the peak, as means of as many rows each."""
-    peak = int(np.argmax(curve.force))
-    u, force = curve.travel[: peak + 1] - onset, curve.force[: peak + 1]
-    first = int(np.argmax(u > -_AIR * u[-1]))
-    u, force = u[first:], force[first:]
-    block = max(1, len(u) // _BINS)
-    count = len(u) // block
-    u, force = (v[len(v) - count * block :].reshape(count, block).mean(axis=1) for v in (u, force))
-    if curve.level_n is not None:
-        return _Way(u, force - curve.level_n, float(block), False)
-    air = u < 0
-    level = float(np.median(force[air])) if air.any() else float(force[0])
-    return _Way(u, force - level, float(block), True)
 
 
 @dataclass(frozen=True)
 class _Tried:
     """One law, with flat or sloped air: each way's fit along shares of the machine."""
 
-    fits: list[_Fit]
+    fits: list[WayFit]
     rows: list[_Row]
 
     @property
@@ -304,7 +147,7 @@ def _squares(row: _Row) -> float:
     return sum(each.squares for each in row[1])
 
 
-def _along(fits: Sequence[_Fit], shares: np.ndarray) -> list[_Row]:
+def _along(fits: Sequence[WayFit], shares: np.ndarray) -> list[_Row]:
     """Fits along the machine's share, closer where they are best."""
     start = [fit.start(float(shares[0])) for fit in fits]
     rows: list[_Row] = []
@@ -345,9 +188,9 @@ def _weighed(tried: Sequence[_Tried], every: np.ndarray, curves: int) -> Elastic
         return _squares(each.best) / max(readings - sum(len(f.values) for f in each.best[1]), 1)
 
     nearest = min(tried, key=per_reading)
-    lasting = float(np.mean([_lasting(each.left) for each in nearest.best[1]]))
+    lasts = float(np.mean([lasting(each.left) for each in nearest.best[1]]))
     force = float(np.mean([fit.root**2 * np.mean(fit.way.force**2) for fit in tried[0].fits]))
-    variance = max(per_reading(nearest), _LEAST**2 * force) * lasting
+    variance = max(per_reading(nearest), _LEAST**2 * force) * lasts
     tables = [table for each in tried for table in _tables(each, variance)]
     top = max(float(table.log.max()) for table in tables)
     weights = [np.exp(table.log - top) for table in tables]
@@ -403,7 +246,7 @@ def _weighed(tried: Sequence[_Tried], every: np.ndarray, curves: int) -> Elastic
     )
 
 
-def _missed(fits: Sequence[_Fit], row: _Row) -> float:
+def _missed(fits: Sequence[WayFit], row: _Row) -> float:
     """rms of what was left out over the rms of the force."""
     found = np.array([f.left_out(row[0], each.values) for f, each in zip(fits, row[1], strict=True)])
     missed, whole = found.sum(axis=0)
@@ -447,7 +290,7 @@ def _marginal(each: _Tried, alike: bool | None, often: float, variance: float) -
     return _Table(law, at, log.ravel(), log_e.ravel(), error.ravel(), *slope)
 
 
-def _of_row(row: Sequence[_Fitted], alike: bool | None, variance: float, apart: np.ndarray) -> np.ndarray:
+def _of_row(row: Sequence[WayFitted], alike: bool | None, variance: float, apart: np.ndarray) -> np.ndarray:
     """(3, a): log of the likelihood, integrated over all that is fitted, log E, its standard error, for
     curves that differ by each of `apart`. alike: None for flat air, else whether all slopes are one."""
     log = sum(-each.squares / (2 * variance) for each in row)
@@ -506,9 +349,3 @@ def _quantiles(
             low, high = (half, high) if below < each else (low, half)
         found.append(0.5 * (low + high))
     return found
-
-
-def _lasting(left: np.ndarray) -> float:
-    """How many readings err alike, from what neighbours leave: 1 for white noise."""
-    alike = float((left[1:] * left[:-1]).sum() / max((left[1:] ** 2).sum(), 1e-300))
-    return max(1.0, (1 + alike) / max(1 - alike, 0.02))

@@ -12,8 +12,9 @@ import numpy as np
 from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.specimen.approach import Approach
 from palpate.diagnosis.specimen.bench import Bench
-from palpate.diagnosis.specimen.elastic_fit import JKR, NAMED, Elastic
+from palpate.diagnosis.specimen.elastic_fit import NAMED, Elastic
 from palpate.diagnosis.specimen.result import MachineTests, Material
+from palpate.diagnosis.specimen.way_in import JKR
 from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.effects.tool_compliance import EFFECT as TOOL
 
