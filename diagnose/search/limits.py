@@ -80,12 +80,15 @@ class Patterns:
                 change[~counted] = 0.0
                 rms = beside_modulus_n(change[counted], before[counted])
                 if rms > 0:
-                    columns.append(_without_first_touches(search, change) if fitted else change)
+                    columns.append(change)
                     own.append(number)
                     size.append(rms)
                     beyond.append(beyond_untold(effect, form))
         self.own, self.size, self.beyond = np.array(own, dtype=int), np.array(size), np.array(beyond)
-        self.columns = shown = np.stack(columns, axis=2)
+        shown = np.stack(columns, axis=2)
+        if fitted:
+            shown[:, :, 1:] = without_first_touches(search, shown[:, :, 1:])
+        self.columns = shown
         drawn = whitener.drawn(DRAWS, np.random.default_rng(seed))
         both = np.concatenate([shown, drawn], axis=2)
         self.white = Products.of(whitener.gram(both), shown.shape[2])
@@ -234,17 +237,22 @@ def _summed(x: np.ndarray, others: bool) -> np.ndarray:
     return total - x if others else np.broadcast_to(total, x.shape)
 
 
-def _without_first_touches(search: Search, change: np.ndarray) -> np.ndarray:
-    """(n, 3) N, a change less what each press's first touch takes up."""
-    t, column = search.forward.touches, search.whitener.onset_column
-    counted = t.counted[:, None]
-    column = np.where(counted, column, 0.0)
-
-    def sums(x: np.ndarray) -> np.ndarray:
-        return np.bincount(t.press, weights=(x * column).sum(axis=1), minlength=len(t))
-
-    moved = sums(change) / np.maximum(sums(column), 1e-300)
-    return change - moved[t.press][:, None] * column
+def without_first_touches(search: Search, changes: np.ndarray) -> np.ndarray:
+    """(n, 3, c) N, changes less what first touches take up that are free: the likeliest by the covariance, so
+    that no change becomes plainer by it."""
+    t = search.forward.touches
+    column = np.where(t.counted[:, None], search.whitener.onset_column, 0.0)
+    rank = np.zeros(len(t), dtype=int)  # of a press among those of its site
+    for site in range(t.sites):
+        own = np.flatnonzero(t.site == site)
+        rank[own] = np.arange(len(own))
+    of_rank = rank[t.press][:, None] == np.arange(rank.max() + 1)
+    each = column[:, :, None] * of_rank[:, None, :]
+    gram = search.whitener.gram(np.concatenate([each, changes], axis=2))
+    k = each.shape[2]
+    taken = np.linalg.pinv(gram[:, :k, :k], hermitian=True) @ gram[:, :k, k:]
+    moved: np.ndarray = np.einsum("nrk,nkc->nrc", each, taken[t.site[t.press]])
+    return changes - moved
 
 
 def forms_of(search: Search, effect: Effect) -> list[np.ndarray]:

@@ -13,7 +13,7 @@ from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.limits import DRAWS, Patterns, detectable
+from palpate.diagnosis.search.limits import DRAWS, Patterns, detectable, without_first_touches
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.model import Model
 
@@ -123,3 +123,20 @@ def test_slow_noise_does_not_hide_what_is_far_above_the_noise(judged):
     slow.renew(base.found)
     quick, late = (float(s.whitener.gram(pushed).sum()) for s in (search, slow))
     assert late > 3 / 9 * quick  # as if all of it were divided by nine, a ninth
+
+
+def test_first_touches_that_are_free_make_no_effect_plainer_and_take_a_shift_of_them_whole(judged):
+    search, base = judged
+    patterns = Patterns(search, base, [effect("tip_radius"), effect("time_delay")], False, seed=5)
+    t, column = search.forward.touches, search.whitener.onset_column
+    shifts = np.random.default_rng(2).normal(size=len(t))[t.press][:, None] * column
+    shifts[~t.counted] = 0.0
+    changes = np.concatenate([patterns.columns[:, :, 1:], shifts[:, :, None]], axis=2)
+    left = without_first_touches(search, changes)
+
+    def squares(x):
+        return np.diag(search.whitener.gram(x).sum(axis=0))
+
+    share = squares(left) / squares(changes)
+    assert (share[:-1] < 1).all()
+    assert share[-1] < 1e-6 < 0.05 < share[:-1].min()
