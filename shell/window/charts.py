@@ -131,6 +131,7 @@ class LiveCharts:
     ) -> pyvista.Chart2D:
         chart = pyvista.Chart2D(size=(0.5, 1.0), loc=(left, 0.0), x_label="time (s)", y_label=label)
         chart.x_range, chart.y_range = [-seconds, 0.0], [0.0, least]
+        chart.x_axis.tick_count = round(seconds) + 1  # on a large window there would be too many to be read
         chart.background_color = chart.border_color = "white"
         for axis in (chart.x_axis, chart.y_axis):
             set_type(axis.GetTitleProperties(), TITLE, False, GREY)

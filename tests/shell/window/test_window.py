@@ -429,6 +429,16 @@ def test_an_empty_plot_shows_newtons_and_millimetres() -> None:
     assert ranges == [[0.0, LEAST_N], [0.0, LEAST_MM]] and LEAST_N > 0.1
 
 
+def test_times_on_a_wide_plot_do_not_touch_each_other() -> None:
+    plotter = pyvista.Plotter(off_screen=True, window_size=[3120, 570])
+    charts = LiveCharts(plotter, 6.0)
+    charts.scale(2.5)
+    plotter.show(auto_close=False)
+    told = list(charts._force.x_axis.tick_labels)
+    plotter.close()
+    assert told == [str(second) for second in range(-6, 1)]
+
+
 def test_every_letter_grows_with_the_window(driven: Driven) -> None:
     """At 4k those of charts, bar and directions were as small as on a laptop."""
     window = driven.window
