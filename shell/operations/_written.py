@@ -56,4 +56,7 @@ def _flag(flag: str, value: Any, repeated: bool) -> list[str]:
     if isinstance(value, Mapping):
         pairs = [f"{key}={each}" for key, each in value.items()]
         return [f"{flag} {shlex.quote(each)}" for each in (pairs if repeated else [",".join(pairs)])]
+    if isinstance(value, list | tuple):
+        each = [f"{one:g}" if isinstance(one, float) else str(one) for one in value]
+        return [f"{flag} {shlex.quote(one)}" for one in (each if repeated else [",".join(each)])]
     return [f"{flag} {shlex.quote(f'{value:g}' if isinstance(value, float) else str(value))}"]

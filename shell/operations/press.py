@@ -117,7 +117,7 @@ def press(
     if places is not None:
         with call.progress("solving the place"):
             curve = solved(curve, places)
-    if is_surface_file(Path(str(model))):
+    if is_surface_file(Path(str(model))) and file.get("young_modulus_pa") is None:
         call.then(f"  (the file says none: {DEFAULT_MODULUS_PA:g} Pa, unless --modulus states another)")
     call.then_save(curve, output)
     call.exit_code = int(curve.on_support and not names_scene(model))

@@ -58,9 +58,9 @@ function start(root) {
   const shade = new Float32Array(points.length);
   geometry.setAttribute("color", new THREE.BufferAttribute(shade, 3));
   geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
-  geometry.computeVertexNormals();
   geometry.computeBoundingSphere();
   const middle = geometry.boundingSphere.center.clone(), size = geometry.boundingSphere.radius;
+  smooth();
   const body = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({vertexColors: true, shininess: 18, specular: 0x151515}));
   scene.add(body);
   floor();
@@ -72,6 +72,18 @@ function start(root) {
   const halo = new THREE.Mesh(new THREE.SphereGeometry(1.75 * dot, 24, 16), new THREE.MeshBasicMaterial({side: THREE.BackSide}));
   halo.visible = false;
   scene.add(halo);
+
+  function smooth() {  // the rim of the foot is lit as the side is: what lies on the floor does not round it off
+    const low = k => points[3 * k] * up.x + points[3 * k + 1] * up.y + points[3 * k + 2] * up.z < data.floor + 1e-3 * size;
+    const side = [];
+    for (let k = 0; k < triangles.length; k += 3) {
+      const corners = triangles.subarray(k, k + 3);
+      if (!corners.every(low)) side.push(...corners);
+    }
+    geometry.setIndex(side.length ? side : Array.from(triangles));
+    geometry.computeVertexNormals();
+    geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+  }
 
   function floor() {  // seen from above alone, with the shade of what stands on it
     const turn = new THREE.Quaternion().setFromRotationMatrix(new THREE.Matrix4().makeBasis(aside, across, up));

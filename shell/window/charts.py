@@ -49,6 +49,8 @@ class ForceTrace:
         return shown
 
 
+LETTER, TITLE, LABEL = 12, 12, 11
+"""Sizes of type of the directions and of the charts, in a window of full size."""
 LENGTH, ROOM = 26.0, 12.0
 """Of an axis, and between letters, pixels of a window of full size."""
 AXES = {name: COLOURS[name] for name in "xyz"}
@@ -78,7 +80,7 @@ class AxesGizmo:
         self.letters = [vtkTextActor() for _ in AXES]
         for letter, (name, colour) in zip(self.letters, AXES.items(), strict=True):
             letter.SetInput(name)
-            set_type(letter.GetTextProperty(), 12, True, colour)
+            set_type(letter.GetTextProperty(), LETTER, True, colour)
             letter.GetTextProperty().SetJustificationToCentered()
             letter.GetTextProperty().SetVerticalJustificationToCentered()
             letter.GetPositionCoordinate().SetCoordinateSystemToViewport()
@@ -98,6 +100,7 @@ class AxesGizmo:
         for k in np.argsort(-np.linalg.norm(seen, axis=1)):
             letter, at = self.letters[k], places[k]
             free = all(np.linalg.norm(at - other) > ROOM * scale for other in (*kept, middle))
+            letter.GetTextProperty().SetFontSize(round(LETTER * scale))
             letter.SetVisibility(free)
             letter.SetPosition(*at)
             if free:
@@ -128,12 +131,21 @@ class LiveCharts:
     ) -> pyvista.Chart2D:
         chart = pyvista.Chart2D(size=(0.5, 1.0), loc=(left, 0.0), x_label="time (s)", y_label=label)
         chart.x_range, chart.y_range = [-seconds, 0.0], [0.0, least]
+        chart.x_axis.tick_count = round(seconds) + 1  # on a large window there would be too many to be read
         chart.background_color = chart.border_color = "white"
         for axis in (chart.x_axis, chart.y_axis):
-            set_type(axis.GetTitleProperties(), 12, False, GREY)
-            set_type(axis.GetLabelProperties(), 11, False, GREY)
+            set_type(axis.GetTitleProperties(), TITLE, False, GREY)
+            set_type(axis.GetLabelProperties(), LABEL, False, GREY)
         plotter.add_chart(chart)
         return chart
+
+    def scale(self, scale: float) -> None:
+        """Letters and lines as large as the window is, against one of full size."""
+        for axis in (axis for chart in (self._force, self._depth) for axis in (chart.x_axis, chart.y_axis)):
+            axis.GetTitleProperties().SetFontSize(round(TITLE * scale))
+            axis.GetLabelProperties().SetFontSize(round(LABEL * scale))
+        for line in (*self._lines, self._deep):
+            line.width = 2.0 * scale
 
     def tell(self, names: Sequence[str]) -> None:
         """Whose forces are drawn, each in its renderer's colour; what is felt first."""

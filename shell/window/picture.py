@@ -27,6 +27,8 @@ LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 SPREAD = 2
+BAR = 11
+"""Size of the colour bar's type, in a window of full size."""
 
 FAR = [COLOURS["object"], COLOURS["fem"], COLOURS["displaced"]]
 """Of displacement: where nothing moves the object has its own colour."""
@@ -59,7 +61,7 @@ class ObjectPicture:
         self._smooth = _spread(felt.normals, felt.triangles[felt.free > 0])
         self._shade()
         self._actor: pyvista.Actor | None = None
-        self._bar = ""
+        self._bar, self._scale = "", 1.0
         self._title = label
         _add_support(plotter, model, self._rest)
         self._tip = plotter.add_mesh(
@@ -142,8 +144,15 @@ class ObjectPicture:
         )
         bar = self._plotter.scalar_bars[self._bar]
         for words in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
-            set_type(words, 11, False, INK)
+            set_type(words, round(BAR * self._scale), False, INK)
         self._actor.prop.interpolation, self._actor.prop.culling = "Gouraud", culling
+
+    def scale(self, scale: float) -> None:
+        """The bar's letters as large as the window is, against one of full size."""
+        self._scale = scale
+        bar = self._plotter.scalar_bars[self._bar]
+        for words in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
+            words.SetFontSize(round(BAR * scale))
 
     def _shade(self) -> None:
         """As the tip feels it: by the contact normals, turned as the surface has turned since."""

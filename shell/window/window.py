@@ -199,6 +199,8 @@ class TouchWindow:
             (self._aside, (right, 0.0, 1.0, 1.0) if self.aside else (0.0, 0.0, 0.01, 0.01)),
         ):
             renderer.viewport = viewport
+        for drawn in (self._charts, *self.pictures):
+            drawn.scale(scale)
         for board in self.boards:
             board.changed = True
         column, aside = self.boards

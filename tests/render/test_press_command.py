@@ -99,3 +99,31 @@ def test_the_fixture_presses_like_the_command(model_folder, tmp_path, press_mode
         curve.force_at(0.0031)
     assert curve.force_at(0.003) == pytest.approx(expected.force_at(0.003), abs=1e-8)
     assert curve.force_at(0.003)[2] > 0.3
+
+
+@pytest.mark.slow
+def test_a_file_of_a_surface_is_felt_again_by_the_command_that_a_press_names(tmp_path, capsys):
+    """What was said of the file goes on, and only what was not said is told."""
+    import shlex
+
+    import pyvista as pv
+
+    from palpate.operations._run import parser_of
+
+    file = str(tmp_path / "organ.stl")
+    pv.Cube(bounds=(120.0, 160.0, -95.0, -55.0, 200.0, 230.0)).triangulate().rotate_z(35).save(file)
+    said = ["--unit", "mm", "--modulus", "12000"]
+    assert main(["press", file, *said, "--depth", "0.002"]) == 0
+    told = capsys.readouterr().out
+    words = shlex.split(next(line for line in told.splitlines() if "feel it: " in line).split("feel it: ")[1])
+    typed = parser_of("touch").parse_args(words[2:])
+    assert vars(typed)["young_modulus_pa"] == ["12000"] and vars(typed)["unit"] == "mm"
+    assert "20000" not in told
+
+
+@pytest.mark.parametrize("typed", [["12000"], ["core=60000", "shell=9000"]])
+def test_moduli_are_typed_again_as_they_came(typed):
+    from palpate.operations._written import typed as command
+
+    words = command("touch", {"scene": "organ.stl", "young_modulus_pa": typed}).split()
+    assert words == ["palpate", "touch", "organ.stl", *(w for each in typed for w in ("--modulus", each))]

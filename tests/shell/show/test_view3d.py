@@ -227,6 +227,38 @@ def test_it_fits_a_phone_and_the_dark(tab, written, width, dark):
 
 
 @needs_browser
+def test_a_screen_of_4k_is_used_and_read_from_as_far(tab, written):
+    tab.open(written, 3840, 2160)
+    tab.wait("document.querySelector('section.view3d').dataset.state === 'live'")
+    wide = tab.evaluate("document.body.getBoundingClientRect().width")
+    assert wide > 0.4 * 3840 and tab.evaluate("document.documentElement.scrollWidth") <= 3840
+    letters = tab.evaluate("getComputedStyle(document.querySelector('p.lead + *')).fontSize")
+    assert float(letters.removesuffix("px")) >= 20
+
+
+@needs_browser
+def test_the_rim_of_a_foot_is_lit_as_the_side_is(shown, tmp_path):
+    """The bottom's triangles, which are uneven at the rim, darkened it in teeth."""
+    wall = trimesh.creation.cylinder(RADIUS, 0.04, sections=64).subdivide().subdivide()
+    wall.apply_translation([0, 0, 0.02])
+    seen = View(
+        Thing(wall.vertices, wall.faces, wall.vertices[:, 2] > 1e-6, np.zeros(3), np.array([0, 0, 1.0])),
+        RADIUS * np.array([[0, 0, 4 / 3]]),
+        [Colouring(ORDER, None, np.array([1.0]), "in order")],
+    )
+    page = Page("A cylinder")
+    page.view(seen, Figure(figsize=(3, 2)), "The picture.")
+    shown.open(page.write(tmp_path / "cylinder.html"))
+    shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
+    shown.wait("document.querySelector('.stage').dataset.azimuth")
+    left, top, width, height = stage(shown)
+    column = pixels(shown, left + width / 2 - 1, top, 2, height).mean(axis=1)
+    beige = np.flatnonzero(column[:, 0] - column[:, 2] > 15)  # the floor is grey
+    foot, above = column[beige[-1] - 4], column[beige[-1] - 60]
+    assert foot.mean() > 0.97 * above.mean()
+
+
+@needs_browser
 def test_without_scripts_the_picture_stays(shown, written):
     shown.call("Emulation.setScriptExecutionDisabled", value=True)
     try:

@@ -429,6 +429,38 @@ def test_an_empty_plot_shows_newtons_and_millimetres() -> None:
     assert ranges == [[0.0, LEAST_N], [0.0, LEAST_MM]] and LEAST_N > 0.1
 
 
+def test_times_on_a_wide_plot_do_not_touch_each_other() -> None:
+    plotter = pyvista.Plotter(off_screen=True, window_size=[3120, 570])
+    charts = LiveCharts(plotter, 6.0)
+    charts.scale(2.5)
+    plotter.show(auto_close=False)
+    told = list(charts._force.x_axis.tick_labels)
+    plotter.close()
+    assert told == [str(second) for second in range(-6, 1)]
+
+
+def test_every_letter_grows_with_the_window(driven: Driven) -> None:
+    """At 4k those of charts, bar and directions were as small as on a laptop."""
+    window = driven.window
+
+    def sizes_of_type() -> np.ndarray:
+        driven.frame()
+        bar = window.plotter.scalar_bars[window.pictures[0]._bar]
+        axes = [axis for c in (window._charts._force, window._charts._depth) for axis in (c.x_axis, c.y_axis)]
+        kinds = [bar.GetTitleTextProperty(), bar.GetLabelTextProperty()]
+        kinds += [kind for axis in axes for kind in (axis.GetTitleProperties(), axis.GetLabelProperties())]
+        return np.array(
+            [kind.GetFontSize() for kind in kinds + [a.GetTextProperty() for a in window._axes.letters]]
+        )
+
+    small, size = sizes_of_type(), window.plotter.window_size
+    window.plotter.window_size = [3840, 2160]
+    large = sizes_of_type()
+    window.plotter.window_size = size
+    assert large.min() >= 25 and (large > 3 * small).all()
+    assert (sizes_of_type() == small).all()
+
+
 def test_no_letter_of_the_axes_lies_on_another(driven: Driven) -> None:
     axes, orbit = driven.window._axes, driven.window.orbit
     seen = set()
