@@ -13,7 +13,7 @@ from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.limits import DRAWS, Patterns, detectable
+from palpate.diagnosis.search.limits import DRAWS, Patterns, Products, detectable
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.model import Model
 
@@ -123,3 +123,15 @@ def test_slow_noise_does_not_hide_what_is_far_above_the_noise(judged):
     slow.renew(base.found)
     quick, late = (float(s.whitener.gram(pushed).sum()) for s in (search, slow))
     assert late > 3 / 9 * quick  # as if all of it were divided by nine, a ninth
+
+
+def test_a_column_of_one_place_alone_says_nothing_of_the_places_without_it():
+    rng = np.random.default_rng(3)
+    rows = rng.normal(size=(4, 30, 3))  # groups, samples, (modulus, a column, a draw)
+    rows[1:, :, 1] = 0.0
+    gram = np.einsum("gsi,gsj->gij", rows, rows)
+    found = Products.of(gram, 2).fitted(np.array([1]))
+    level = np.array([gram[k, 0, 2] for k in range(4)])
+    without_first = level[1:].sum() / gram[1:, 0, 0].sum()
+    alone = gram[0, 2, 2] - 2 * without_first * gram[0, 0, 2] + without_first**2 * gram[0, 0, 0]
+    assert found.held[0, 0] == pytest.approx(alone, rel=1e-6)
