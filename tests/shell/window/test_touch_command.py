@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import palpate as pp
 from palpate.cli import main
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import read_recording
@@ -39,6 +40,11 @@ def test_headless_session_with_a_recording(
     recording = read_recording(path)
     assert recording.truth["protection_loosened"] == [loosened]
     assert recording.t[-1] > 2.0 and recording.object_name == block.path.name
+
+
+def test_a_model_that_is_in_no_folder_is_to_be_saved_before_a_window_or_a_device_touches_it(block: Model):
+    with pytest.raises(pp.OptionError, match="save"):
+        pp.touch(block.replaced(path=None), headless=True)
 
 
 @pytest.mark.parametrize(
