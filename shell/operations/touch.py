@@ -149,7 +149,8 @@ def touch(
 
     name = device or ("simulated" if headless else "mouse")
     if name == "mouse" and in_notebook():
-        return _on_a_page(scene, record, screenshot, file, call)
+        _on_a_page(scene, record, screenshot, file, call)
+        return None
     scene = _named(scene)
     _check(name, renderer, beside, seconds, replay, headless)
     for word in servo.loosened:
