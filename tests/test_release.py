@@ -79,11 +79,25 @@ def test_the_changelog_is_read_in_five_minutes():
     assert len(newest.split()) <= 5 * 240
 
 
+def _asked(line: str) -> tuple[str, frozenset[str]]:
+    """A requirement's name, as conda-forge has it, and its bounds."""
+    name, bounds = re.fullmatch(r"([\w-]+)\s*(.*)", line.partition(";")[0].strip()).groups()
+    return {"matplotlib": "matplotlib-base"}.get(name, name), frozenset(
+        bounds.replace(" ", "").split(",")
+    ) - {""}
+
+
 def test_the_recipe_asks_for_what_the_package_asks_for():
     recipe = (REPOSITORY / "packaging" / "conda-forge" / "recipe.yaml").read_text("utf-8")
     run = recipe.partition("  run:\n")[2].partition("\ntests:")[0]
-    asked = set(re.findall(r"^    - ([\w-]+)", run, re.MULTILINE))
-    names = {"matplotlib": "matplotlib-base"}
-    everywhere = [line for line in PROJECT["dependencies"] if ";" not in line]
-    wanted = {re.match(r"[\w-]+", line)[0] for line in everywhere}
-    assert {names.get(name, name) for name in wanted} <= asked
+    asked = {_asked(line) for line in re.findall(r"^    - (.+)$", run, re.MULTILINE)}
+    python = ("python", frozenset({PROJECT["requires-python"]}))
+    everywhere = {_asked(line) for line in PROJECT["dependencies"] if ";" not in line}
+    assert asked == everywhere | {python}
+    built = tomllib.loads((REPOSITORY / "pyproject.toml").read_text("utf-8"))["build-system"]["requires"]
+    host = recipe.partition("  host:\n")[2].partition("  run:")[0]
+    assert {_asked(line) for line in built} <= {
+        _asked(line) for line in re.findall(r"^    - (.+)$", host, re.MULTILINE)
+    }
+    (script,) = PROJECT["scripts"].items()
+    assert f"- {script[0]} = {script[1]}" in recipe
