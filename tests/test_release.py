@@ -9,10 +9,14 @@ import tarfile
 import tomllib
 from importlib import metadata
 
+import pytest
+
 import palpate
+from tools import tutorials
 from tools.same_bytes import repacked
 
 from .conftest import REPOSITORY
+from .docs.test_blocks_run import lines_of
 
 
 def _archive(names: list[str], seconds: int, owner: str) -> bytes:
@@ -101,3 +105,22 @@ def test_the_recipe_asks_for_what_the_package_asks_for():
     }
     (script,) = PROJECT["scripts"].items()
     assert f"- {script[0]} = {script[1]}" in recipe
+
+
+@pytest.mark.parametrize("name", tutorials.NAMES)
+def test_a_release_runs_each_command_of_a_tutorial(name):
+    printed = lines_of(tutorials.PAGES / f"{name}.md")
+    ran = [text for kind, text in tutorials.steps(name, screen=True) if kind == "command"]
+    left_out = [line for line in printed if line not in ran]
+    assert all(tutorials.NOT_HERE.match(line) for line in left_out)
+    scripts = [kind for kind, _ in tutorials.steps(name, screen=False) if kind.endswith(".py")]
+    assert scripts == (["late.py"] if name == "first-diagnosis" else [])
+    touches = [t for _, t in tutorials.steps(name, screen=False) if t.startswith("palpate touch")]
+    assert all("--headless" in each for each in touches)
+
+
+def test_what_a_page_says_is_printed_is_compared_by_words_and_nearly_by_numbers():
+    line = "a touch is 145 mN off, 23 mN with it"
+    assert tutorials.is_said(line, "first\na touch is 144 mN off, 23 mN with it")
+    assert not tutorials.is_said(line, "a touch is 160 mN off, 23 mN with it")
+    assert not tutorials.is_said(line, "a press is 145 mN off, 23 mN with it")
