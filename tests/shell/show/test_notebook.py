@@ -5,13 +5,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import nbclient
 import pytest
 
 from .browser import a_tab, browser_found
 from .frames import page_in
-
-nbclient = pytest.importorskip("nbclient", reason="needs nbclient and ipykernel, which execute notebooks")
-pytest.importorskip("ipykernel", reason="needs nbclient and ipykernel, which execute notebooks")
 
 CELLS = (
     "import numpy as np\n"
