@@ -133,25 +133,30 @@ def _cell(words: str) -> str:
 
 
 def age(evidence: Evidence, root: Path = ROOT) -> str:
-    """What a page says of figures that are older than the code they measure by more than a release, or of a
-    state that this history does not have; '' for others. root: of the clone."""
-    commit = evidence.commit.removesuffix("-dirty")
+    """What a page says of figures whose code has changed since, in any version, or that are of a
+    state which this history does not have; '' for others. root: of the clone."""
     if not _git(root, "rev-parse", "--git-dir"):
         return ""  # not a clone: nothing is known of what came when
-    then, now = _version(root, commit), _version(root, "HEAD")
+    then, now = _version(root, evidence.commit.removesuffix("-dirty")), _version(root, "HEAD")
     if not then:
         return "**These figures are of a state that this history does not have.** Run the command again."
-    releases = _releases_between(root, commit)
-    changed = _git(
-        root, "rev-list", "--count", f"{commit}..HEAD", "--", *_measured(root, evidence.name)
-    ).strip()
-    if releases < 1 or changed in ("", "0"):
+    changed = changes(evidence, root)
+    if not changed:
         return ""
-    much = f"{releases} release{'s' * (releases > 1)}"
+    commits = "1 commit has" if changed == 1 else f"{changed} commits have"
+    folders = ", ".join(f"`{folder}`" for folder in _measured(root, evidence.name))
+    version = f"version {now}" if then == now else f"version {then} then, {now} now"
     return (
-        f"**These figures are older than the code by {much}** (of version {then}; this is {now}): what they "
-        f"measure has changed in {changed} commits since. Run the command again."
+        f"**Since then {commits} changed what it measures** (folders {folders}; {version}). "
+        "The figures are of the commit above: the command says what they are now."
     )
+
+
+def changes(evidence: Evidence, root: Path = ROOT) -> int | None:
+    """How many commits since changed the folders that a benchmark imports; None where that cannot be told."""
+    commit = evidence.commit.removesuffix("-dirty")
+    asked = ("rev-list", "--count", f"{commit}..HEAD", "--", *_measured(root, evidence.name))
+    return int(said) if (said := _git(root, *asked).strip()) else None
 
 
 def _git(root: Path, *words: str) -> str:
@@ -164,14 +169,6 @@ def _version(root: Path, commit: str) -> str:
     """The program's version at a commit; '' where that cannot be told."""
     text = _git(root, "show", f"{commit}:pyproject.toml")
     return str(tomllib.loads(text)["project"]["version"]) if text else ""
-
-
-def _releases_between(root: Path, commit: str) -> int:
-    """How many times the version changed since a commit."""
-    asked = ("log", "--format=%H", f"{commit}..HEAD", "--", "pyproject.toml")
-    states = [commit, *reversed(_git(root, *asked).split()), "HEAD"]
-    versions = [_version(root, state) for state in states]
-    return sum(one != two for one, two in zip(versions, versions[1:], strict=False))
 
 
 def _measured(root: Path, name: str) -> list[str]:
@@ -221,16 +218,18 @@ def write(folder: Path, source: Path = EVIDENCE) -> None:
         _keep(folder / f"{evidence.name}.md", page(evidence))
         aimed = [figure for figure in evidence.figures if figure["target"]]
         missed = [_cell(figure["what"]) for figure in aimed if not figure["met"]]
+        since = changes(evidence)
         rows.append(
-            f"| [{evidence.name}]({evidence.name}.md) | {evidence.date} | {len(evidence.figures)} | "
+            f"| [{evidence.name}]({evidence.name}.md) | {evidence.date}, {evidence.commit[:7]} | "
+            f"{'?' if since is None else since} | {len(evidence.figures)} | "
             f"{', '.join(missed) or ('none' if aimed else 'no target')} |"
         )
         names.append(evidence.name)
     lines = ["# Figures", ""]
     if have:
         lines += [
-            "| benchmark | measured | figures | targets missed |",
-            "| --- | --- | --- | --- |",
+            "| benchmark | measured | commits since that changed its code | figures | targets missed |",
+            "| --- | --- | --- | --- | --- |",
             *rows,
             "",
         ]

@@ -24,6 +24,7 @@ if INSTALLED.name != "palpate":
     )
 sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 import _evidence  # noqa: E402
+import _notebooks  # noqa: E402
 import _reference  # noqa: E402
 import _touch  # noqa: E402
 
@@ -35,7 +36,7 @@ html_theme = "furo"
 html_title = f"Palpate {release}"
 html_show_copyright = False
 html_favicon = None
-html_extra_path = ["reference/generated/files"]  # schemas/NAME.schema.json
+html_extra_path = ["reference/generated/files"]  # schemas/NAME.schema.json, notebooks/NAME.ipynb
 exclude_patterns = ["**/README.md"]
 # names of constants that are unpacked from a tuple are there all the same
 # annotations name local types by their last word, which others share
@@ -109,6 +110,13 @@ def short_navigation(app, page, template, context, doctree):
         context["toctree"] = lambda **how: whole(**how | {"collapse": True, "maxdepth": 2})
 
 
+def with_its_notebook(app, page, text):
+    """A tutorial ends with the way to its notebook."""
+    folder, _, name = page.rpartition("/")
+    if folder == "tutorials" and name in _notebooks.NAMES:
+        text[0] += f'\n<p><a href="../notebooks/{name}.ipynb" download>This page as a notebook</a></p>\n'
+
+
 def with_pages_to_press(app):
     """Those of docs/touch.md, written beside the site's own while these are made."""
     if app.builder.format == "html":
@@ -120,6 +128,8 @@ def setup(app):
     """Sphinx's hook."""
     app.connect("builder-inited", with_pages_to_press)
     _reference.write(ROOT / "docs" / "reference" / "generated")
+    _notebooks.write(ROOT / "docs" / "reference" / "generated" / "files" / "notebooks")
+    app.connect("source-read", with_its_notebook)
     _evidence.write(ROOT / "docs" / "evidence" / "generated")
     app.connect("autodoc-process-docstring", plain_words)
     app.connect("html-page-context", short_navigation, priority=400)

@@ -108,7 +108,7 @@ class Result:
         return str(self)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the words, and the plot under them."""
+        """What a notebook shows: the words, the view of the pages where there is one, and the plot."""
         return _presented(self).html(self)
 
 

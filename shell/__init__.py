@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from palpate.operations.renderer import renderer as renderer
     from palpate.operations.replay import replay as replay
     from palpate.operations.simulate import simulate as simulate
+    from palpate.operations.touch import touch as touch
     from palpate.reconstruction.checks.finding import Checkup as Checkup
     from palpate.reconstruction.pipeline import Reconstruction as Reconstruction
     from palpate.render.base import Renderer as Renderer

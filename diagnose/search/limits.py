@@ -208,7 +208,10 @@ class Products:
             mm_, rm_, rd_, md_, dd_ = (_summed(x, others) for x in (mm[None], rm, rd, md, dd))
             amplitude = np.zeros_like(rm)
             if column is not None:
-                amplitude += (rd_ - md_ * rm_ / mm_) / np.maximum(dd_ - md_**2 / mm_, _LEAST * dd_)
+                least = np.maximum(
+                    _LEAST * dd.sum(axis=1, keepdims=True), 1e-300
+                )  # also of what is in one alone
+                amplitude += (rd_ - md_ * rm_ / mm_) / np.maximum(dd_ - md_**2 / mm_, least)
             found.append((self._left((rm_ - amplitude * md_) / mm_, amplitude, column), amplitude[:, 0]))
         (loss, by_all), (held, _) = found
         return Fitted(loss, held, by_all)

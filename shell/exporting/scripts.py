@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.exporting.subject import Subject
+from palpate.mechanics.extras import install_words
 from palpate.render.simulators.base import ScriptedAdapter
 from palpate.render.simulators.drake import Drake
 from palpate.render.simulators.newton import Newton
@@ -56,7 +57,7 @@ def _write(path: Path, subject: Subject, kind: type[ScriptedAdapter]) -> tuple[s
     )
     package, _, name = kind.scene_module.rpartition(".")
     scene = files(package).joinpath(f"{name}.py").read_text(encoding="utf-8")
-    head = f"# {subject.label}\n# pip install {kind.extra}; python FILE\n"
+    head = f"# {subject.label}\n# {install_words(kind.extra)}; python FILE\n"
     path.write_text(head + scene + press, encoding="utf-8")
     return subject.run_notes(kind)
 

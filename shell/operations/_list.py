@@ -39,7 +39,7 @@ OPERATIONS = {
     "compare": Entry("compare FEM with spring-damper models, or two recordings", "compare changes"),
     "diagnose": Entry("find which effect a simulation leaves out, where, and how large it is", "diagnose"),
     "calibrate": Entry("calibrate the instrument by presses on a known object", "calibrate"),
-    "touch": Entry("feel a model or scene at 1 kHz"),
+    "touch": Entry("feel a model or scene at 1 kHz", "touch"),
     "devices": Entry("list the devices, and why some are not available"),
     "explore": Entry("suggest where to touch next, why, and when to stop"),
     "simulate": Entry("simulate a person's exploration of a phantom (the virtual laboratory)", "simulate"),

@@ -31,7 +31,8 @@ from palpate.mechanics.names import unknown
 from palpate.mechanics.progress import Progress
 from palpate.operations._call import Call
 from palpate.operations._declare import EachOf, Given, argument, operation, option
-from palpate.operations._shared import SAMPLES, MeshFileOptions, Seed, given_scene, with_friction
+from palpate.operations._shared import SAMPLES, MeshFileOptions, Seed, given_model, given_scene, with_friction
+from palpate.operations.load import load
 from palpate.output import progress_bar
 from palpate.render.options import RenderOptions
 from palpate.render.registry import names
@@ -44,6 +45,7 @@ from palpate.warm_up import OF_A_TOUCH, OF_ITS_SERVO, warming_up
 from palpate.window.session import SessionOptions, TouchSession
 
 if TYPE_CHECKING:
+    from palpate.operations._shared import ModelLike
     from palpate.window.guide import Guide
 
 POLL_S = 0.1
@@ -87,7 +89,7 @@ class ServoRun:
 @operation(common="young_modulus_pa unit friction max_force_n", progress=False)
 def touch(
     scene: Annotated[
-        str | None,
+        ModelLike | None,
         argument(
             "what to touch; None: chosen in the window, headless: demo",
             metavar="MODEL_OR_SCENE",
@@ -137,8 +139,19 @@ def touch(
     exploration: ExplorationOptions,
     call: Call,
 ) -> ServoRun | None:
-    """Open, touch, close; None where the window was closed before the touch began."""
+    """Open a window, touch, close it; None where it was closed before the touch began.
+
+    In a notebook, where no device is named, the page in which the object is pressed is shown instead, and
+    None returned. Lengths m, forces N. Raises OptionError for a model that is in no folder where a window or
+    a device is to touch it, DeviceError for what the device cannot.
+    """
+    from palpate.show.notebook import in_notebook
+
     name = device or ("simulated" if headless else "mouse")
+    if name == "mouse" and in_notebook():
+        _on_a_page(scene, record, screenshot, file, call)
+        return None
+    scene = _named(scene)
     _check(name, renderer, beside, seconds, replay, headless)
     for word in servo.loosened:
         print(f"palpate touch: {word}", file=sys.stderr)
@@ -174,6 +187,30 @@ def touch(
         call.following = [f"next: {follows}"]
         call.exit_code = touched.exit_code
     return touched
+
+
+def _on_a_page(scene: Any, record: Any, screenshot: Any, file: Table[str, Any], call: Call) -> None:
+    """The page in which it is pressed, in the cell that runs."""
+    from palpate.show.notebook import show_page_to_press
+
+    if record is not None or screenshot is not None:
+        raise OptionError(
+            "a notebook's page to press records nothing: run `palpate touch ... --record REC.csv.gz` in a "
+            'terminal, or name a device (device="simulated", headless=True)'
+        )
+    model = load(given_model(DEFAULT if scene is None else scene, file, "touch"), progress=call.wanted)
+    with call.progress("touch") as show_progress:
+        show_page_to_press(model, show_progress)
+
+
+def _named(scene: Any) -> str | None:
+    """What a process of its own opens: a name or path."""
+    if scene is None or isinstance(scene, str | Path):
+        return None if scene is None else str(scene)
+    model = load(scene)
+    if model.path is None:
+        raise OptionError('this model is in memory alone: made.save("MODEL"), then pp.touch("MODEL")')
+    return str(model.path)
 
 
 def _without(opening: _Opening, name: str, seconds: float | None) -> ServoRun:

@@ -135,7 +135,7 @@ class _Presenter:
             return plotter
         view = self.view(result) if screenshot is None and in_notebook() else None
         if view is not None:
-            show_view(view, result.lines()[0], self._picture(result))
+            show_view(view, result.lines()[0])
             return None
         plotter = new_plotter(off_screen=screenshot is not None)
         place(result, plotter)
@@ -164,9 +164,9 @@ class _Presenter:
         return _function(result, "save", "file of its own")(result, path)
 
     def html(self, result: Result) -> str:
-        from palpate.show.notebook import words_and_picture
+        from palpate.show.notebook import cell
 
-        return words_and_picture(str(result), self._picture(result))
+        return cell(str(result), self.view(result), self._picture(result))
 
     def _picture(self, result: Result) -> Figure:
         from palpate.show.page import new_figure

@@ -8,12 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.frames import tangents
 from palpate.render.base import Renderer
 from palpate.render.force_error import said
 from palpate.render.press import Curve
 from palpate.show import story as say
 from palpate.show.colours import COLOURS, colour_of
+from palpate.show.model import facing, thing_of, usual_colourings
 from palpate.show.page import feel_step
+from palpate.show.quantities import DEPTH
+from palpate.show.view3d import Colouring, Line, Traces, View
 from palpate.words import kpa, mm, part_words, unsettled_words
 
 if TYPE_CHECKING:
@@ -110,6 +114,22 @@ def draw(result: Curve, ax: Axes) -> None:
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)
     ax.legend(frameon=False, loc="upper left")
+
+
+def view(result: Curve) -> View | None:
+    """The object, and the curve at the place that was pressed; None of what was read or met no object."""
+    if result.renderer is None or result.on_support or result.normal is None or not (result.depth > 0).any():
+        return None
+    model, n = result.renderer.model, np.asarray(result.normal)
+    first = int(np.argmax(result.depth > 0))
+    at = result.position[first] - float(result.tip_radius_m or model.tool.tip_radius_m) * n
+    axes = np.stack([n, *tangents(n)])
+    kind = result.renderer.name if result.renderer.name in COLOURS else "fem"
+    line = Line(result.renderer.name, result.force @ axes.T, kind)
+    traces = Traces(np.array([0, len(result.t)]), result.depth, result.t - result.t[first], [line])
+    deepest = Colouring(DEPTH, None, np.array([result.depth.max()]), "Where it was pressed, and how deep.")
+    own = [each for each in usual_colourings(model) if each.presses is None]
+    return View(thing_of(model), at[None], [deepest, *own], traces, 0, facing(model.support.normal, n))
 
 
 def place(result: Curve, plotter: Plotter) -> None:

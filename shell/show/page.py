@@ -55,19 +55,25 @@ _PHONE_PX = 400
 """Across a phone: a legible picture that is wider says that a tap shows it large."""
 _MOST_COLUMNS = 3
 """Of a table that a phone shows side by side; in wider ones each row becomes a list."""
+_FOOTER = (
+    "<footer>Made by palpate. Positions are in the device's frame, forces are those on the tool.</footer>"
+)
 _DPI = 110
 _MOST_SVG, _MOST_PARTS = 400_000, 3000
 """Bytes of a packed drawing that a page carries, and its dots and faces; a picture of more stays a PNG."""
 
 
 class Page:
-    """Collects parts in order; `write` renders them whole. folder: where named pictures are written too."""
+    """Collects parts in order; `write` renders them whole.
 
-    def __init__(self, title: str, folder: Path | None = None) -> None:
+    folder: where named pictures are written too. bare: without its name and its last line, for a frame. live:
+    whether it holds a view."""
+
+    def __init__(self, title: str, folder: Path | None = None, *, bare: bool = False) -> None:
         self.title = title
-        self._folder = folder
-        self._parts: list[str] = [f"<h1>{html.escape(title)}</h1>"]
-        self._live = self._inside = False
+        self._folder, self._bare = folder, bare
+        self._parts: list[str] = [] if bare else [f"<h1>{html.escape(title)}</h1>"]
+        self.live = self._inside = False
         self._chapters: list[str] = []
         self._first: int | None = None
         self._terms = Terms()
@@ -193,7 +199,7 @@ class Page:
         """The object to be turned, and of a model a button to press it; without scripts the picture with its
         caption."""
         self._parts.append(view.html(self._figure(picture, caption)))
-        self._live = True
+        self.live = True
         if model is not None:
             from palpate.exporting.page.document import button
 
@@ -205,12 +211,12 @@ class Page:
         return (
             '<!doctype html><html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f"<title>{html.escape(self.title)}</title><style>{style_sheet()}{_file('page.css')}</style></head><body>"
+            f"<title>{html.escape(self.title)}</title><style>{style_sheet()}{file_text('page.css')}</style></head><body>"
             + "\n".join([*self._parts[:first], contents(self._chapters), *self._parts[first:]])
             + self._terms.listed()
             + self._result
-            + "<footer>Made by palpate. Positions are in the device's frame, forces are those on the tool."
-            + f"</footer>{self._scripts()}</body></html>"
+            + ("" if self._bare else _FOOTER)
+            + f"{self._scripts()}</body></html>"
         )
 
     def write(self, path: Path | str) -> Path:
@@ -220,8 +226,8 @@ class Page:
         return Path(path)
 
     def _scripts(self) -> str:
-        own = f"<script>{_file('page.js')}</script>"
-        if not self._live:
+        own = f"<script>{file_text('page.js')}</script>"
+        if not self.live:
             return own
         from palpate.show.view3d import scripts
 
@@ -293,7 +299,7 @@ def scrolling(wide: str) -> str:
 
 
 @cache
-def _file(name: str) -> str:
+def file_text(name: str) -> str:
     return files("palpate.show").joinpath(name).read_text(encoding="utf-8")
 
 

@@ -291,7 +291,7 @@ def test_replay_gives_the_sample_of_its_time() -> None:
 
 
 def test_registry() -> None:
-    with pytest.raises(DeviceError, match="allowed are mouse"):
+    with pytest.raises(DeviceError, match="mouse, spacemouse"):
         make_device("dataglove")
     choice = DeviceChoice("simulated", {"intention": _rest(0.1), "seed": 2})
     again = pickle.loads(pickle.dumps(choice))

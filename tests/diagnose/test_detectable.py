@@ -13,7 +13,13 @@ from palpate.diagnosis.forward.touches import touches_of
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.limits import DRAWS, Patterns, detectable, without_first_touches
+from palpate.diagnosis.search.limits import (
+    DRAWS,
+    Patterns,
+    Products,
+    detectable,
+    without_first_touches,
+)
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.model import Model
 
@@ -140,3 +146,15 @@ def test_first_touches_that_are_free_make_no_effect_plainer_and_take_a_shift_of_
     share = squares(left) / squares(changes)
     assert (share[:-1] < 1).all()
     assert share[-1] < 1e-6 < 0.05 < share[:-1].min()
+
+
+def test_a_column_of_one_place_alone_says_nothing_of_the_places_without_it():
+    rng = np.random.default_rng(3)
+    rows = rng.normal(size=(4, 30, 3))  # groups, samples, (modulus, a column, a draw)
+    rows[1:, :, 1] = 0.0
+    gram = np.einsum("gsi,gsj->gij", rows, rows)
+    found = Products.of(gram, 2).fitted(np.array([1]))
+    level = np.array([gram[k, 0, 2] for k in range(4)])
+    without_first = level[1:].sum() / gram[1:, 0, 0].sum()
+    alone = gram[0, 2, 2] - 2 * without_first * gram[0, 0, 2] + without_first**2 * gram[0, 0, 0]
+    assert found.held[0, 0] == pytest.approx(alone, rel=1e-6)

@@ -1,4 +1,5 @@
-"""The listing of CONTRIBUTING.md is a simulator, in one file and one line, as it stands."""
+"""The listing of CONTRIBUTING.md is a simulator, that of the how-to is an effect: one file and one line, as
+they stand."""
 
 from __future__ import annotations
 
@@ -10,9 +11,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from palpate.mechanics.effects import registry as known_effects
 from palpate.mechanics.model.files import read_model
 from palpate.render import registry
 from palpate.render.press import Stroke, press
+
+from .test_blocks_run import DOCS, code_of
 
 PAGE = Path(__file__).resolve().parents[2] / "CONTRIBUTING.md"
 
@@ -42,3 +46,14 @@ def test_the_listed_simulator_is_a_bed_of_springs(bed, block_folder):
     stiffness = model.material.young_modulus_pa / 0.03 * area
     assert curve.peak_force_n == pytest.approx(stiffness * 1e-3, rel=0.25)
     assert np.allclose(curve.force[0], 0) and curve.force[curve.deepest, 2] > 0
+
+
+def test_the_listed_effect_reads_no_more_than_its_range(monkeypatch: pytest.MonkeyPatch):
+    module = ModuleType("palpate.mechanics.effects.saturation")
+    exec(compile(code_of(DOCS / "howto" / "write-an-effect.md")[0], "saturation.py", "exec"), module.__dict__)
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr(known_effects, "NAMES", (*known_effects.NAMES, "saturation"))
+    effect = known_effects.effects()[-1]
+    force = np.array([[0.0, 0.0, 3.0], [0.6, 0.0, 0.8], [0.0, 0.0, 0.0]])
+    assert np.allclose(module.saturate(force, 1.5), [[0.0, 0.0, 1.5], [0.6, 0.0, 0.8], [0.0, 0.0, 0.0]])
+    assert effect.name == "saturation" and np.array_equal(module.saturate(force, effect.ideal[0]), force)

@@ -72,7 +72,7 @@ def test_a_typed_number_is_seen():
     assert seen == ["12.3 ms", "96 %", "0.022 N", "0.021 to 0.026 N", "1,250 Hz", "3.5 times"]
 
 
-def test_a_page_says_when_its_figures_are_older_than_the_code_by_a_release(tmp_path):
+def test_a_page_says_how_often_what_it_measures_has_changed_since(tmp_path):
     def git(*words):
         identity = ("-c", "user.name=x", "-c", "user.email=x@x", "-c", "commit.gpgsign=false")
         subprocess.run(["git", "-C", str(tmp_path), *identity, *words], check=True, capture_output=True)
@@ -99,15 +99,14 @@ def test_a_page_says_when_its_figures_are_older_than_the_code_by_a_release(tmp_p
     made = evidence.Evidence("speed", "palpate bench speed", first, "2026-11-24", "2 cores", ())
     assert evidence.age(made, tmp_path) == ""
     state("0.1.0", "a = 2")
-    assert evidence.age(made, tmp_path) == "", "within a release"
+    assert "1 commit has changed" in evidence.age(made, tmp_path), "within a version too"
     state("0.2.0", "a = 3")
-    assert "older than the code by 1 release** (of version 0.1.0; this is 0.2.0)" in evidence.age(
-        made, tmp_path
-    )
+    assert evidence.changes(made, tmp_path) == 2
+    assert "(folders `mechanics`; version 0.1.0 then, 0.2.0 now)" in evidence.age(made, tmp_path)
     fresh = dataclasses.replace(made, commit=state("0.2.0", "a = 3") + "-dirty")
     state("0.3.0", "a = 3", "other = 1")
-    assert evidence.age(fresh, tmp_path) == "", "what it measures has not changed"
-    assert "by 2 releases" in evidence.age(made, tmp_path)
+    assert evidence.age(fresh, tmp_path) == "", "a new version alone makes nothing older"
+    assert evidence.changes(made, tmp_path) == 2
     assert "does not have" in evidence.age(dataclasses.replace(made, commit="f" * 40), tmp_path)
 
 

@@ -33,10 +33,19 @@ def test_to_import_reconstruct_press_and_diagnose_needs_no_vtk_and_no_matplotlib
     assert "palpate" in tops and not tops & {"vtk", "vtkmodules", "pyvista", "matplotlib"}
 
 
+COMMANDS = {
+    "press": "press demo --at 0,0,0.08 --depth 0.003 --json press.json",
+    "reconstruct": "reconstruct silicone-1-cylinder -o MODEL --json made.json",
+    "diagnose": "diagnose silicone-1-cylinder --model demo --fast --json gap.json",
+}
+"""What runs without a screen. VTK reads mesh.vtu and finds nearest places: that is no matter of imports."""
+
+
 @pytest.mark.slow
-def test_a_press_of_a_model_loads_nothing_that_draws(block_folder: Path):
-    press = f"pp.press({str(block_folder)!r}, at=(0, 0, 0.03), depth_m=0.002, progress=False).lines()"
-    names = loaded(IMPORTS + press)
-    assert "vtkmodules.vtkCommonDataModel" in names  # that reads mesh.vtu and finds nearest places
-    drawn = {n for n in names if n.startswith(DRAWS)}
-    assert not drawn
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_that_writes_json_loads_nothing_that_draws(name, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = COMMANDS[name].split()
+    names = loaded(f"import sys, json\nfrom palpate.cli import main\nassert main({words!r}) == 0")
+    assert "vtkmodules.vtkCommonDataModel" in names and "numba" in names
+    assert not {n for n in names if n.startswith(DRAWS)}

@@ -32,7 +32,7 @@ def test_import_loads_nothing_heavy():
 def test_door_is_what_was_promised():
     promised = "read_recording reconstruct load renderer replay press compare diagnose simulate batch "
     promised += "check import_table read_table model_of export options material calibrate changes "
-    promised += "open recording conformance"
+    promised += "open recording conformance touch"
     assert set(FUNCTIONS) == set(promised.split())
     assert set(RESULTS) == set(
         "Recording Model Reconstruction ReplayResult Curve Comparison Diagnosis Simulation Batch "

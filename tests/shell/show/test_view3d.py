@@ -17,6 +17,7 @@ from palpate.show.quantities import DEPTH, ERROR, MODULUS, ORDER, UNCERTAINTY
 from palpate.show.view3d import Colouring, Line, Thing, Traces, View, scripts
 
 from . import browser
+from .frames import page_in
 
 needs_browser = pytest.mark.skipif(
     browser.browser_found() is None, reason="needs a browser: chromium or google-chrome on the PATH"
@@ -301,4 +302,5 @@ def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
     support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))
     model = Model(mesh, ObjectMaterial(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015)
     assert model.show() is None
-    assert len(shown) == 1 and shown[0].startswith("<div><iframe srcdoc=") and "view3d" in shown[0]
+    assert len(shown) == 1 and shown[0].startswith("<div><iframe srcdoc=")
+    assert 'class="view3d"' in page_in(shown[0])

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import palpate as pp
 from palpate.cli import main
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import read_recording
@@ -41,11 +42,16 @@ def test_headless_session_with_a_recording(
     assert recording.t[-1] > 2.0 and recording.object_name == block.path.name
 
 
+def test_a_model_that_is_in_no_folder_is_to_be_saved_before_a_window_or_a_device_touches_it(block: Model):
+    with pytest.raises(pp.OptionError, match="save"):
+        pp.touch(block.replaced(path=None), headless=True)
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
         (["--headless", "--device", "mouse"], "drop --headless"),
-        (["--headless", "--device", "glove"], "allowed are mouse"),
+        (["--headless", "--device", "glove"], "mouse, spacemouse"),
         (["--headless", "--renderer", "magic"], "allowed are fem"),
         (["--headless", "--seconds", "-1"], "greater than 0"),
         (["--headless", "--device", "replay"], "--replay REC"),
