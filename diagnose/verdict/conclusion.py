@@ -102,7 +102,7 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
             forward, residual_before, findings.readings.free, findings.site_sd, stated_gap(findings, answer),
             seed=findings.seed,
         ),
-        entries=entries_of(findings, answer, gaps, counts, rng),
+        entries=entries_of(findings, answer, gaps, counts),
         young_modulus_pa=found.final.found.modulus,
         next_touch=proposed(findings.search, found, answer.rivals),
         errors_n=_errors(findings),
@@ -168,10 +168,9 @@ def _alike(findings: Findings) -> list[tuple[str, str, float]]:
     return alike(findings.search, found.base, strong)
 
 
-def entries_of(
-    findings: Findings, answer: Answer, gaps: Gaps, counts: np.ndarray, rng: np.random.Generator
-) -> tuple[EffectEntry, ...]:
-    """The lines, what is named first, then the likeliest. counts: (g,) thinned contact samples."""
+def entries_of(findings: Findings, answer: Answer, gaps: Gaps, counts: np.ndarray) -> tuple[EffectEntry, ...]:
+    """The lines, what is named first, then the likeliest. counts: (g,) thinned contact samples. Each effect
+    has its own draws, so that another in the library moves no number."""
     forward, search, found = findings.forward, findings.search, findings.found
     offsets, strain = findings.instrument_offsets, search.finite_strain
     noise, added = findings.noise_n, forward.touches.thinned_away
@@ -182,8 +181,13 @@ def entries_of(
         held = sum(e.probability for e in found.explanations if name in e.effects)
         return float((1 - WEIGHTS.lapse) * held)
 
-    def closed_by(plain: np.ndarray, draws: int) -> tuple[float | None, tuple[float, float] | None]:
-        return closed_share_ci95(gaps.before, plain, counts, noise**2 - added, rng, draws)
+    def drawn(name: str) -> np.random.Generator:
+        return np.random.default_rng([findings.seed, *name.encode()])
+
+    def closed_by(
+        name: str, plain: np.ndarray, draws: int
+    ) -> tuple[float | None, tuple[float, float] | None]:
+        return closed_share_ci95(gaps.before, plain, counts, noise**2 - added, drawn(name), draws)
 
     counted = forward.touches.counted
     plain = (forward.touches.local_force - found.base.residual)[counted]
@@ -197,20 +201,20 @@ def entries_of(
         alone = score.candidate
         if name not in found.scores:
             alone = search.judge([*found.base.found.effects, own], like=found.base)
-        closed, interval = closed_by(alone.plain, draws)
+        closed, interval = closed_by(name, alone.plain, draws)
         fitted = found.final.found if name in found.chosen else score.candidate.found
         entries.append(
             EffectEntry(
                 name, own.domain, sure(name), gap(alone.plain, counts, added),
                 closed, interval, own.report(fitted.of(name), forward, fitted.modulus), score.gain,
-                parameter_intervals(fitted, name, forward, search.dof, rng),
+                parameter_intervals(fitted, name, forward, search.dof, drawn(name)),
                 limits.get(name, float("nan")), felt(alone.residual - found.base.residual),
             )
         )  # fmt: skip
     if found.finite_strain_gain > -search.options.beyond_doubt or strain.name in answer.names:
         left = gap(found.deep.plain, counts, added)
         there = (1 - WEIGHTS.lapse) * float(expit(found.finite_strain_gain))
-        closed, interval = closed_by(found.deep.plain, draws)
+        closed, interval = closed_by(strain.name, found.deep.plain, draws)
         entries.append(
             EffectEntry(
                 strain.name, strain.domain, there, left, closed, interval,
@@ -220,7 +224,7 @@ def entries_of(
         )  # fmt: skip
     for name in offsets.names:
         left = gap(found.ideal.plain, counts, added)
-        closed, interval = closed_by(found.ideal.plain, OFFSET_DRAWS)
+        closed, interval = closed_by(name, found.ideal.plain, OFFSET_DRAWS)
         entries.append(
             EffectEntry(
                 name, effect(name).domain, READ, left, closed, interval, offsets.parameters[name],

@@ -225,6 +225,7 @@ MAKERS: dict[str, Callable[[Path], Bench]] = {
     "forcedimension": lambda folder: VendorBench(folder, "dhd"),
     "openhaptics": lambda folder: VendorBench(folder, "hd"),
 }
-FORCEFUL = [name for name in MAKERS if name != "spacemouse"]
+FORCELESS = ("spacemouse",)
+FORCEFUL = [name for name in MAKERS if name not in FORCELESS]
 
 __all__ = ["FORCEFUL", "MAKERS", "Bench", "SimulatedHand", "ThreadedDevice", "eventually"]

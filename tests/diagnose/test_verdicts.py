@@ -25,6 +25,7 @@ from palpate.reconstruction.presses_on_model import presses_on
 from palpate.show.demo import diagnosis_json, diagnosis_words
 from palpate.show.diagnosis.gaps import press_gaps
 from palpate.show.diagnosis.parameters import parameter_rows, short
+from palpate.show.diagnosis.story import next_steps
 from palpate.show.diagnosis.words import short_verdict, verdict, where
 from palpate.words import force_words, spoken
 
@@ -92,7 +93,7 @@ def test_what_only_a_later_step_tried_has_its_numbers_too(delayed):
     findings = dataclasses.replace(findings, found=found)
     counts = findings.search.whitener.counts()
     gaps, rng = held_out_gaps(findings), np.random.default_rng(0)
-    entry = entries_of(findings, answer_of(findings, counts), gaps, counts, rng)[0]
+    entry = entries_of(findings, answer_of(findings, counts), gaps, counts)[0]
     assert entry.name == "time_delay" and entry.parameters["delay_s"] == pytest.approx(0.02, abs=0.002)
     assert entry.gap_closed == pytest.approx(delayed[2].entries[0].gap_closed, abs=0.02)
 
@@ -342,6 +343,14 @@ def test_what_the_model_already_has_is_not_proposed_again(delayed, tmp_path, no_
     assert ["put finite strain into the model" in page for page in pages] == [True, False, False]
     assert ["--corrected" in page for page in pages] == [True, True, False]
     assert [r.as_json()["verdict"]["effects"] for r in (linear, neo)] == [list(both.effects)] * 2
+
+
+def test_what_no_model_holds_is_not_to_be_put_into_one(delayed):
+    found = delayed[2]
+    entry = dataclasses.replace(found.entries[0], name="surface_offset", domain="boundary")
+    moved = dataclasses.replace(found, effects=("surface_offset",), entries=(entry,), kind="effect")
+    said = "\n".join(next_steps(moved))
+    assert "no model holds surface offset" in said and "--apply" not in said
 
 
 def test_a_terminal_speaks_as_people_do(delayed):

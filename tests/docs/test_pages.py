@@ -22,7 +22,8 @@ PAGES = [
 ]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 COUNTED = ("tutorials", "howto", "reading", "explanation", "develop")
-MOST_WORDS, MOST_README_WORDS, MOST_COLUMNS, MOST_DECISIONS = 25_000, 900, 120, 40
+MOST_WORDS, MOST_README_WORDS, MOST_COLUMNS, MOST_DECISIONS = 23_300, 900, 120, 40
+GROWS = "effects.md"  # by a section an effect: what one adds by the how-to must not fail a count of words
 GENERATED = {
     "commands",
     "options",
@@ -76,7 +77,7 @@ def test_the_guide_is_short():
     words = {
         page: len(page.read_text(encoding="utf-8").split())
         for page in PAGES
-        if page.parent.name in COUNTED or page.name == "index.md"
+        if (page.parent.name in COUNTED or page.name == "index.md") and page.name != GROWS
     }
     assert 10_000 < sum(words.values()) < MOST_WORDS
     assert len((REPOSITORY / "README.md").read_text(encoding="utf-8").split()) <= MOST_README_WORDS

@@ -9,6 +9,7 @@ import numpy as np
 
 from palpate.diagnosis.apply import improved
 from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.model import Model
 from palpate.show import story as say
 from palpate.show.diagnosis.figures import (
@@ -128,8 +129,9 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
     measured, model = diagnosed(result)
     recording = file_words(measured.path, "REC")
     asked = {e.name: e.domain for e in result.entries if e.name in missing(result)}
-    kept = [name for name, domain in asked.items() if domain != "instrument"]
     instrument = [name for name, domain in asked.items() if domain == "instrument"]
+    kept = [name for name in asked if name not in instrument and effect(name).rendered]
+    no_model_holds = [name for name in asked if name not in (*instrument, *kept)]
     if model.path is not None:
         recording += f" --model {file_words(model.path, 'MODEL')}"
     if kept:
@@ -142,6 +144,8 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
             f"take {spoken(instrument)} off the readings, since it is the instrument's and not the object's: "
             f"`palpate diagnose {recording} --corrected BETTER.csv.gz`"
         )
+    if no_model_holds:
+        yield f"explore again, and reconstruct: no model holds {spoken(no_model_holds)}"
     if not asked:
         yield feel_step(model.path, f"palpate reconstruct {recording} -o MODEL")
     if result.next_touch is not None and result.unsettled:
