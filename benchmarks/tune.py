@@ -30,7 +30,7 @@ from palpate.render.simulators.base import over
 from palpate.scenes.conformance.scaled import scaled_body
 
 TUNED_ON, UNSEEN = "cylinder", ("kidney", "dome")
-WITHIN_S = 90.0
+WITHIN_S = 60.0
 """Of the processor, for one case, of tuning and of identifying alike."""
 UNTIL_S = 0.24
 """Of a path: its way in, and its hold."""

@@ -166,6 +166,7 @@ def tuned(
     held = held_before if same else off(runs, best.values, judged.held)
     shapes = shapes_before if same else [off(runs, best.values, [path]) for path in judged.unseen]
     given = adapter.stated["young_modulus_pa"]
+    dear = [] if search.budget.over(best) == 1.0 else ["nothing that was tried costs as little as was asked"]
     ended = list(dict.fromkeys(why for sums in (best.sums, held, *shapes) for why in sums.ended))
     return Tuned(
         simulator=adapter.name,
@@ -202,7 +203,7 @@ def tuned(
         seconds=clock() - begun,
         time_is_up=search.time_is_up,
         named=tuple(named),
-        notes=(*notes, *(f"ended without a force: {why}" for why in ended)),
+        notes=(*notes, *dear, *(f"ended without a force: {why}" for why in ended)),
     )  # fmt: skip
 
 

@@ -175,10 +175,14 @@ class Search:
             better.sort(key=lambda t: self._key(beside[t.name]))
             ends += [self._line(current, tunable) for tunable in better[:LINES]]
             best = min(ends, key=self._key, default=current)
-            cheaper = self.budget.over(best) < self.budget.over(current)
-            if not cheaper and NEAR * best.gap_n > current.gap_n:
+            if not self._worth(best, current):
                 return
             current = best
+
+    def _worth(self, trial: Trial, best: Trial) -> bool:
+        """Whether to go on there: nearer by more than nothing, or no longer too expensive."""
+        (over, gap_n), (was, before_n) = self._key(trial), self._key(best)
+        return over < was or (over == was and NEAR * gap_n < before_n)
 
     def _met(self, trial: Trial) -> bool:
         return trial.whole and trial.gap_n <= self.target_n and self.budget.over(trial) == 1.0
@@ -194,9 +198,9 @@ class Search:
         best, name = current, tunable.name
         low: float | None
         for up in (True, False):
-            while (value := tunable.beside(best.values[name], up)) is not None:
+            while (value := tunable.beside(best.values[name], up)) is not None and not self._met(best):
                 trial = self.tried({**current.values, name: value}, best)
-                if self._key(trial) >= self._key(best):
+                if not self._worth(trial, best):
                     break
                 best = trial
             if best is not current:
@@ -211,7 +215,7 @@ class Search:
                 if middle is None or self._met(best):
                     continue
                 trial = self.tried({**current.values, name: middle}, best)
-                if self._key(trial) < self._key(best):
+                if self._worth(trial, best):
                     best = trial
             if best.values[name] == at:
                 low = None if low is None else tunable.between(at, low)

@@ -37,13 +37,14 @@ class Tunable:
         return math.sqrt(one * two)
 
     def size(self, start: float, value: float) -> float:
-        """How large a change is: the logarithm of the ratio; from or to infinity twice the whole ladder's."""
+        """How large a change is: the logarithm of the ratio; infinity lies twice the ladder beyond it."""
         if start == value:
             return 0.0
         if math.isfinite(start) and math.isfinite(value):
             return abs(math.log(value / start))
-        finite = [rung for rung in self.rungs if math.isfinite(rung)]
-        return 2 * math.log(finite[-1] / finite[0])
+        ends = [rung for rung in self.rungs if math.isfinite(rung)]
+        beyond = 2 * math.log(ends[-1] / ends[0])
+        return beyond + math.log(ends[-1] / min(start, value))
 
 
 EDGES = Tunable(

@@ -227,12 +227,12 @@ def _named(
     except DiagnosisError as error:
         return (), [f"settings were tried in their usual order, as the start gave no diagnosis: {error}"]
     numerics = found_gap.parts["numerics"].names
-    own = [name for name in (*numerics, *found_gap.candidates) if name in adapter_effects(adapter)]
+    own = [name for name in (*numerics, *found_gap.candidates) if name in _mended_by(adapter)]
     said = ", ".join(name.replace("_", " ") for name in own) or "nothing that a setting mends"
     return tuple(own), [f"the diagnosis of the start names {said}: tried first"]
 
 
-def adapter_effects(adapter: Any) -> set[str]:
+def _mended_by(adapter: Any) -> set[str]:
     """Numerical effects that one of its settings mends."""
     return {name for tunable in adapter.tunables for name in tunable.mends}
 

@@ -215,7 +215,7 @@ def test_a_contact_that_is_too_soft_is_tuned_away(tmp_path, monkeypatch):
     force = block.force(Given(poisson=LAYOUT.poisson))
     recording, model = block.measured(np.random.default_rng(0), force)
     settings = {"simulator_settings": "best", "simulator_set": "edge_radii=inf,penalty=0.2"}
-    settings |= {"within": "60s", "shapes": False, "progress": False}
+    settings |= {"within": "1h", "shapes": False, "progress": False}
     path = tmp_path / "block.py"
     found = pp.tune(recording, model, renderer="scikit-fem", save=path, **settings)
     assert "penalty" in [m.name for m in found.moved] and found.settings["penalty"] > 1.0
