@@ -6,7 +6,9 @@ import itertools
 import json
 import math
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import ClassVar
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,17 +16,20 @@ import pytest
 import palpate as pp
 from palpate.cli import main
 from palpate.diagnosis.other_simulator.runs import Runs, Sums, TruePath
-from palpate.diagnosis.other_simulator.tuned import Judged, tuned
+from palpate.diagnosis.other_simulator.tuned import Judged, Moved, tuned
 from palpate.diagnosis.other_simulator.tuning import Budget, Search, Trial
-from palpate.exporting.settings import write_settings
+from palpate.exporting.settings import SUFFIXES
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.options import DOCUMENTED, RenderOptions
-from palpate.render.registry import simulator_names
+from palpate.render.registry import _SIMULATORS, simulator_names
 from palpate.render.simulators.base import Adapter, SimulatorRenderer
 from palpate.render.simulators.tunable import Tunable
 from palpate.scenes.conformance.scaled import scaled_body
+from palpate.schemas import identity
+
+from ..support.schemas import faults
 
 TOP_M, RADIUS_M = 0.024, 0.006
 
@@ -177,16 +182,40 @@ def test_a_body_of_the_kit_has_its_force_at_any_modulus_and_tip():
 
 @pytest.mark.parametrize("name", simulator_names())
 def test_what_may_be_tuned_is_a_setting_within_its_rungs(name):
-    from importlib import import_module
-
-    from palpate.render.registry import _SIMULATORS
-
     module = import_module(_SIMULATORS[name])
     for tunable in module.TUNABLES:
         assert tunable.rungs == tuple(sorted(set(tunable.rungs))) and tunable.term
         for settings in module.SETTINGS.values():
             value = getattr(settings, tunable.name)
             assert tunable.rungs[0] <= value <= tunable.rungs[-1] or not tunable.mends
+
+
+@pytest.mark.parametrize("name", simulator_names())
+def test_settings_are_written_in_that_simulators_own_file(springs, tmp_path, name):
+    runs, path = Runs("springs", RenderOptions()), press(springs, 0.002)
+    plain = tuned(runs, springs, Judged([path], [path], []), noise_n=10.0, law_n=0.0, within_s=60.0)
+    module = import_module(_SIMULATORS[name])
+    began = {t.name: float(getattr(module.SETTINGS[DOCUMENTED], t.name)) for t in module.TUNABLES}
+    first = module.TUNABLES[0]
+    settings = {**began, first.name: first.rungs[1]}
+    moved = (Moved(first.name, began[first.name], first.rungs[1], first.term),)
+    found = replace(plain, simulator=name, began=began, settings=settings, moved=moved)
+    file = tmp_path / f"settings{SUFFIXES[name]}"
+    assert found.save(file) == file and found.save(file) == file  # its own kind is replaced
+    text = file.read_text()
+    written = {
+        "mujoco": f'solref="{first.rungs[1]:g} 1"',
+        "scikit-fem": f'"{first.name}": {first.rungs[1]!r}',
+    }
+    assert written.get(name, f"    {first.name}={first.rungs[1]!r},") in text
+    if name == "mujoco":
+        ElementTree.fromstring(text)
+    else:
+        compile(text, file.name, "exec")
+    with pytest.raises(pp.OptionError, match="must end in"):
+        found.save(tmp_path / "settings.txt")
+    json.dumps(found.as_json(), allow_nan=False)
+    assert not faults("tune", {"schema": identity("tune"), **found.as_json()})
 
 
 @pytest.mark.parametrize(
@@ -220,11 +249,5 @@ def test_a_contact_that_is_too_soft_is_tuned_away(tmp_path, monkeypatch):
     found = pp.tune(recording, model, renderer="scikit-fem", save=path, **settings)
     assert "penalty" in [m.name for m in found.moved] and found.settings["penalty"] > 1.0
     assert found.gap_after_n < 0.5 * found.gap_before_n and found.modulus_moved == 0.0
-    assert "contact_stiffness" in found.named
-    text = path.read_text()
-    assert text.startswith("# Palpate tuned settings") and "penalty" in text
-    values: dict = {}
-    exec(text, values)
-    assert values["SETTINGS"] == found.settings
-    assert write_settings(path, found) == path  # its own kind is replaced
+    assert "penalty" in path.read_text()
     json.dumps(found.as_json(), allow_nan=False)
