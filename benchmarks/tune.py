@@ -85,17 +85,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(json.dumps(rows[-1], indent=1))
     progress.close()
-    header = [
-        "simulator",
-        "planted",
-        "moved",
-        "shape",
-        "before",
-        "tuned",
-        "identified",
-        "bound",
-        "E identified",
-    ]
+    gaps = ["before", "tuned", "identified", "bound"]
+    header = ["simulator", "planted", "moved", "shape", *gaps, "E moved by"]
     print(table(header, [line for row in rows for line in _lines(row)]))
     return {"figures": _figures(rows), "cases": rows}
 

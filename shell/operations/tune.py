@@ -104,7 +104,7 @@ def tune(
     simulator_set: NumbersOfSimulator = "",
     presses: Annotated[
         int,
-        option("presses that it is run over, spread over the places: half are held out", low=2),
+        option("presses that it is run over, spread over the places: half are held out", low=LEAST_PRESSES),
     ] = LEAST_PRESSES,
     diagnosed: Annotated[
         bool, option("diagnose the start first: what is named is tried first", flag="--diagnosis")
