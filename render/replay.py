@@ -116,12 +116,8 @@ def replay_touches(
     """
     scene, t = scene_of(touched), recording.t
     forces = np.zeros((len(t), 3))
-    before = np.concatenate([[-np.inf], presses.end_s[:-1]])
     numbers = np.flatnonzero(chosen)
-    parts = [
-        slice(*np.searchsorted(t, [max(presses.onset_s[p] - LEAD_S, before[p]), presses.end_s[p] + LEAD_S]))
-        for p in numbers
-    ]
+    parts = [rows_of_touch(t, presses, p) for p in numbers]
     whole, done, left = sum(part.stop - part.start for part in parts), 0, Remaining()
     left.tell(0.0)
     if parts:
@@ -146,6 +142,13 @@ def replay_touches(
             words = ", ".join(word for word in (f"press {k} of {len(parts)}", left.words()) if word)
             progress(words, done / whole)
     return forces
+
+
+def rows_of_touch(t: np.ndarray, presses: Presses, number: int) -> slice:
+    """Rows of t (n,) s from shortly before a press's first touch to shortly after its loss."""
+    before = presses.end_s[number - 1] if number else -np.inf
+    begun = max(presses.onset_s[number] - LEAD_S, before)
+    return slice(*np.searchsorted(t, [begun, presses.end_s[number] + LEAD_S]))
 
 
 def write_forces(path: Path | str, t: np.ndarray, forces: np.ndarray) -> None:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from palpate.diagnosis.explore.segments import Instrument as Instrument
     from palpate.diagnosis.explore.segments import Segment as Segment
     from palpate.diagnosis.other_simulator.result import SimulatedGap as SimulatedGap
+    from palpate.diagnosis.other_simulator.tuned import Tuned as Tuned
     from palpate.diagnosis.specimen.result import Material as Material
     from palpate.diagnosis.verdict.result import Diagnosis as Diagnosis
     from palpate.importing.imported import Imported as Imported
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
     from palpate.operations.replay import replay as replay
     from palpate.operations.simulate import simulate as simulate
     from palpate.operations.touch import touch as touch
+    from palpate.operations.tune import tune as tune
     from palpate.reconstruction.checks.finding import Checkup as Checkup
     from palpate.reconstruction.pipeline import Reconstruction as Reconstruction
     from palpate.render.base import Renderer as Renderer
@@ -96,6 +98,7 @@ _OTHERS = {
     "palpate.diagnosis.compare.comparison": "Comparison",
     "palpate.diagnosis.verdict.result": "Diagnosis",
     "palpate.diagnosis.other_simulator.result": "SimulatedGap",
+    "palpate.diagnosis.other_simulator.tuned": "Tuned",
     "palpate.scenes.laboratory.simulate": "Simulation",
     "palpate.batching.summary": "Batch",
     "palpate.render.base": "Renderer",

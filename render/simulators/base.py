@@ -13,8 +13,9 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import importlib.metadata
+import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
@@ -29,6 +30,7 @@ from palpate.mechanics.shape.refine import refined_around
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.render.base import Renderer, check_radii
 from palpate.render.options import RenderOptions
+from palpate.render.simulators.tunable import Tunable
 from palpate.render.surface.snapping import touched_surface
 
 NEAR_M, AWAY_M = 0.5e-3, 1e-3
@@ -98,6 +100,9 @@ class Adapter(ABC):
 
     settings: dict[str, Any]
     """Of each of its two settings the frozen dataclass of numbers that `--simulator-set` changes."""
+
+    tunables: tuple[Tunable, ...] = ()
+    """Those that `palpate tune` may move, what costs least first."""
 
     def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
         self.model, self.friction = model, friction
@@ -221,6 +226,12 @@ def changed(settings: Any, text: str) -> Any:
     return dataclasses.replace(settings, **values)
 
 
+def over(text: str, values: Mapping[str, Any]) -> str:
+    """KEY=VALUE words with these values over them."""
+    said = dict(pairs(words_of(text), "--simulator-set", "edge_radii=0.5")) | dict(values)
+    return ",".join(f"{key}={value}" for key, value in said.items())
+
+
 class SimulatedState(NamedTuple):
     """As render.base.State, and world: the World that is under way, in a list of one a tip."""
 
@@ -237,13 +248,17 @@ class SimulatedState(NamedTuple):
 
 
 class SimulatorRenderer(Renderer):
-    """Another simulator as a renderer: it takes its own time, and no servo should wait for it."""
+    """Another simulator as a renderer: it takes its own time, and no servo should wait for it.
+
+    spent_s: of the processor, for touches of simulated_s.
+    """
 
     def __init__(self, name: str, model: Model, adapter: type[Adapter], options: RenderOptions) -> None:
         self.name, self.model, self.options = name, model, options
         self.contact = touched_surface(model, options)
         self.adapter = adapter(model, options, friction_of(model, options))
         self._tree = cKDTree(self.contact.arrays.vertices)
+        self.spent_s, self.simulated_s = 0.0, 0.0
 
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> SimulatedState:
         radii = check_radii(radii_m, self.model)
@@ -269,7 +284,10 @@ class SimulatorRenderer(Renderer):
         try:
             if world is None:
                 world = self.adapter.begin(tip, float(state.radii_m[i]))
+            begun = time.process_time()
             force = world.step(float(state.dt_s[0]), tip)
+            self.spent_s += time.process_time() - begun
+            self.simulated_s += float(state.dt_s[0])
         except PalpateError:
             raise
         except Exception as error:  # another's code may raise anything

@@ -17,6 +17,7 @@ import numpy as np
 from palpate.mechanics.progress import Progress, silent
 from palpate.render.options import BEST, DOCUMENTED
 from palpate.render.simulators.base import ScriptedAdapter, made
+from palpate.render.simulators.tunable import EDGES, Tunable, density
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -28,16 +29,30 @@ if TYPE_CHECKING:
 class DrakeSettings:
     """timestep_s; damping_s: stiffness damping of the object; sphere_radii: edges of the sphere's mesh, in
     its radii; edge_radii: edges of the object under the tip, in its radii, inf as the model has them;
-    relaxation_s: of the contact, as SAP has it; inf: as documented."""
+    relaxation_s: of the contact, as SAP has it; inf: as documented; density_kg_m3: of the object."""
 
     timestep_s: float
     damping_s: float
     sphere_radii: float
     edge_radii: float = np.inf
     relaxation_s: float = np.inf
+    density_kg_m3: float = 1000.0
 
 
 SETTINGS = {DOCUMENTED: DrakeSettings(1e-2, 1e-2, 1.0), BEST: DrakeSettings(1e-3, 4e-3, 0.15, 0.35, 0.1)}
+
+TUNABLES = (
+    Tunable("sphere_radii", (0.15, 0.3, 0.6, 1.0), "resolution_hint of the sphere, over its radius",
+            ("contact_offset", "contact_nodes", "contact_stiffness")),
+    EDGES,
+    density("set_mass_density of the DeformableBodyConfig"),
+    Tunable("damping_s", (1e-3, 2e-3, 4e-3, 1e-2, 3e-2), "set_stiffness_damping_coefficient",
+            ("numerical_damping",)),
+    Tunable("timestep_s", (1e-3, 2e-3, 5e-3, 1e-2, 2e-2), "time_step of the plant",
+            ("time_step", "numerical_damping", "lost_contact")),
+    Tunable("relaxation_s", (0.01, 0.03, 0.1, np.inf), "relaxation_time of SAP, of both sides together",
+            ("contact_stiffness",), whole=True),
+)  # fmt: skip
 
 
 class Drake(ScriptedAdapter):
@@ -47,6 +62,7 @@ class Drake(ScriptedAdapter):
     needs = ("pydrake",)
     scene_module = "palpate.render.simulators.drake_scene"
     settings = SETTINGS
+    tunables = TUNABLES
     presses = 12
     cannot = (
         "linear tetrahedra alone, which lock near Poisson's ratio 0.5",

@@ -26,7 +26,6 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-DENSITY_KG_M3 = 1000.0
 HEAVY_KG = 1e6
 """Of the sphere, whose pose and velocity are set at every step: the object does not move it within one."""
 
@@ -49,6 +48,7 @@ class Scene:
         damping_s: float,
         sphere_radii: float,
         relaxation_s: float,
+        density_kg_m3: float,
     ) -> None:
         builder = DiagramBuilder()
         self.plant, _ = AddMultibodyPlantSceneGraph(builder, timestep_s)
@@ -68,7 +68,7 @@ class Scene:
         config = DeformableBodyConfig()
         config.set_youngs_modulus(young_modulus_pa)
         config.set_poissons_ratio(poisson_ratio)
-        config.set_mass_density(DENSITY_KG_M3)
+        config.set_mass_density(density_kg_m3)
         config.set_mass_damping_coefficient(0.0)
         config.set_stiffness_damping_coefficient(damping_s)
         config.set_material_model(MaterialModel.kLinearCorotated)

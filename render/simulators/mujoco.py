@@ -21,6 +21,7 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.render.options import BEST, DOCUMENTED
 from palpate.render.simulators.base import SteppedAdapter, Touch, made
+from palpate.render.simulators.tunable import EDGES, Tunable, density
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 POISSON_LIMIT = 0.45
 """Beyond it linear tetrahedra lock, and the solver of the elastic forces does not converge at 0.49."""
-DENSITY_KG_M3 = 1000.0
 HEAVY_KG = 1e3
 """Of the tip: what it gains of speed within a step by what pushes it is nothing."""
 
@@ -40,7 +40,8 @@ class MujocoSettings:
     damping_s: of the flex's elasticity; edge_radii: edges under the tip, in its radii, inf as the model has
     them; skin_m: radius of the flex, by which its surface stands off; material: 1 Saint Venant-Kirchhoff, as
     files have it, 2 stable neo-Hookean (elastic3d of an MjSpec); friction_ratio: impratio, how much harder
-    friction holds than the contact pushes: at 1 a tip that rests creeps back."""
+    friction holds than the contact pushes: at 1 a tip that rests creeps back; density_kg_m3: of the object,
+    which swings the less after a press the lighter it is; cone: of friction, 1 pyramids, 2 elliptic."""
 
     timestep_s: float
     solref_s: float
@@ -52,12 +53,34 @@ class MujocoSettings:
     skin_m: float = 1e-4
     material: float = 1
     friction_ratio: float = 1.0
+    density_kg_m3: float = 1000.0
+    cone: float = 2
 
 
 SETTINGS = {
     DOCUMENTED: MujocoSettings(2e-3, 0.02),
     BEST: MujocoSettings(1e-3, 0.004, 1.0, 0.002, 0.35, 0.99, 0.999, 1e-5, 2, 10.0),
 }
+
+
+_CONES = {1: "pyramidal", 2: "elliptic"}
+TUNABLES = (
+    Tunable("solref_s", (0.002, 0.004, 0.008, 0.016, 0.032, 0.064), 'the first number of solref="..."',
+            ("contact_stiffness", "tunnelling", "lost_contact")),
+    EDGES,
+    Tunable("material", (1, 2), "elastic3d of an MjSpec, plus 1 (2: stable neo-Hookean)", ("tunnelling",),
+            whole=True),
+    density('mass="..." of the flexcomp, over its volume'),
+    Tunable("damping_s", (0.0005, 0.002, 0.005, 0.01, 0.02, 0.05), 'damping="..." of the elasticity',
+            ("numerical_damping",)),
+    Tunable("timestep_s", (0.0005, 0.001, 0.002, 0.004, 0.008), 'timestep="..." of the option',
+            ("time_step", "numerical_damping", "lost_contact")),
+    Tunable("impedance", (0.9, 0.95, 0.99), 'the first number of solimp="..."', ("contact_stiffness",),
+            whole=True),
+    Tunable("skin_m", (1e-5, 1e-4, 3e-4, 1e-3), 'radius="..." of the flexcomp', ("contact_offset",)),
+    Tunable("friction_ratio", (1.0, 3.0, 10.0), 'impratio="..." of the option', ("numerical_drift",)),
+    Tunable("cone", (1, 2), 'cone="..." of the option (1 pyramidal, 2 elliptic)', (), whole=True),
+)  # fmt: skip
 
 
 def scene_xml(
@@ -72,8 +95,8 @@ def scene_xml(
     """An object as a flex, and a sphere whose centre is the first three of qpos, away from `start` (3,) m
     (None: the origin). given: as `Adapter.stated`. beside: more elements of the file.
 
-    All of the scene but `own.material`, which no file can say. Its cones of friction are elliptic: the usual
-    pyramids push back the less the greater the friction is, from 1 on, and at 10 not at all.
+    All of the scene but `own.material`, which no file can say. Its cones of friction are elliptic unless the
+    settings say so: pyramids push back the less the greater the friction is, from 1 on, at 10 not at all.
     """
     points = " ".join(f"{value:.6g}" for value in mesh.points.ravel())
     elements = " ".join(str(node) for node in mesh.tetrahedra.ravel())
@@ -83,14 +106,14 @@ def scene_xml(
         f'<joint name="tip_{name}" type="slide" axis="{axis}"/>'
         for name, axis in zip("xyz", ("1 0 0", "0 1 0", "0 0 1"), strict=True)
     )
-    mass = DENSITY_KG_M3 * float(mesh.volumes.sum())
+    mass = own.density_kg_m3 * float(mesh.volumes.sum())
     contact = (
         f'condim="3" friction="{given["friction"]:g}" solref="{own.solref_s:g} {own.damping_ratio:g}" '
         f'solimp="{own.impedance:g} {own.impedance_deep:g} 0.001"'
     )
     return f"""<mujoco>
-<option timestep="{own.timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG" cone="elliptic"
-impratio="{own.friction_ratio:g}"/>
+<option timestep="{own.timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG"
+cone="{_CONES[round(own.cone)]}" impratio="{own.friction_ratio:g}"/>
 <size memory="1G"/>
 <worldbody>
 <body name="tip"{at}>
@@ -125,6 +148,7 @@ class MuJoCo(SteppedAdapter):
     name, extra, units = "mujoco", "mujoco", "SI: m, kg, s, N, Pa"
     needs = ("mujoco",)
     settings = SETTINGS
+    tunables = TUNABLES
     poisson_limit = POISSON_LIMIT
     presses = 12
     cannot = (

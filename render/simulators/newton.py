@@ -16,6 +16,7 @@ import numpy as np
 from palpate.mechanics.progress import Progress, silent
 from palpate.render.options import BEST, DOCUMENTED
 from palpate.render.simulators.base import ScriptedAdapter, made
+from palpate.render.simulators.tunable import EDGES, Tunable, density
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -30,7 +31,7 @@ POISSON_LIMIT = 0.45
 class NewtonSettings:
     """timestep_s; sweeps: of the solver, a step; contact_n_per_m: of one contact; skin_m: what keeps surfaces
     apart (a particle's radius), by which the sphere is led farther out; damping_s: of the elasticity;
-    edge_radii: edges under the tip, in its radii, inf as the model has them."""
+    edge_radii: edges under the tip, in its radii, inf as the model has them; density_kg_m3: of the object."""
 
     timestep_s: float
     sweeps: float
@@ -38,9 +39,23 @@ class NewtonSettings:
     skin_m: float = 1e-4
     damping_s: float = 1e-9
     edge_radii: float = np.inf
+    density_kg_m3: float = 1000.0
 
 
 SETTINGS = {DOCUMENTED: NewtonSettings(1 / 600, 10, 1e3), BEST: NewtonSettings(1e-3, 20, 3e3, edge_radii=0.5)}
+
+TUNABLES = (
+    Tunable("contact_n_per_m", (30.0, 100.0, 300.0, 1e3, 3e3, 1e4), "soft_contact_ke, and ke of the sphere",
+            ("contact_stiffness", "tunnelling")),
+    Tunable("sweeps", (5, 10, 20, 40, 80), "iterations of SolverVBD", ("mesh_stiffness", "time_step"),
+            whole=True),
+    EDGES,
+    density("density of add_soft_mesh"),
+    Tunable("timestep_s", (5e-4, 1e-3, 1 / 600, 4e-3, 8e-3), "the step",
+            ("time_step", "numerical_damping", "lost_contact")),
+    Tunable("damping_s", (1e-9, 1e-4, 1e-3, 1e-2, 3e-2), "k_damp of add_soft_mesh", ("numerical_damping",)),
+    Tunable("skin_m", (1e-5, 1e-4, 3e-4, 1e-3), "particle_radius", ("contact_offset",)),
+)  # fmt: skip
 
 
 class Newton(ScriptedAdapter):
@@ -50,6 +65,7 @@ class Newton(ScriptedAdapter):
     needs = ("newton", "warp")
     scene_module = "palpate.render.simulators.newton_scene"
     settings = SETTINGS
+    tunables = TUNABLES
     poisson_limit = POISSON_LIMIT
     presses = 12
     cannot = (

@@ -7,8 +7,6 @@ import newton
 import numpy as np
 import warp
 
-DENSITY_KG_M3 = 1000.0
-
 warp.config.log_level = warp.LOG_WARNING
 
 
@@ -31,6 +29,7 @@ class Scene:
         contact_n_per_m: float,
         skin_m: float,
         damping_s: float,
+        density_kg_m3: float,
     ) -> None:
         young, nu = young_modulus_pa, poisson_ratio
         builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
@@ -39,7 +38,7 @@ class Scene:
         builder.add_shape_sphere(sphere, radius=radius_m - skin_m, cfg=hard)
         builder.add_soft_mesh(
             pos=warp.vec3(0.0), rot=warp.quat_identity(), scale=1.0, vel=warp.vec3(0.0),
-            density=DENSITY_KG_M3, particle_radius=skin_m, indices=tetrahedra.ravel().tolist(),
+            density=density_kg_m3, particle_radius=skin_m, indices=tetrahedra.ravel().tolist(),
             vertices=[warp.vec3(*point) for point in points.tolist()], k_mu=young / (2 + 2 * nu),
             k_lambda=young * nu / ((1 + nu) * (1 - 2 * nu)), k_damp=damping_s,
         )  # fmt: skip

@@ -21,6 +21,7 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.render.options import BEST, DOCUMENTED
 from palpate.render.simulators.base import Adapter, World, made
+from palpate.render.simulators.tunable import EDGES, Tunable
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -40,6 +41,12 @@ class ScikitFemSettings:
 
 
 SETTINGS = {DOCUMENTED: ScikitFemSettings(10.0), BEST: ScikitFemSettings(30.0, 2, 0.45)}
+TUNABLES = (
+    Tunable("penalty", (0.3, 1.0, 3.0, 10.0, 30.0, 100.0), "spring of the contact, over the stiffness of the "
+            "object under one node", ("contact_stiffness",)),
+    Tunable("order", (1, 2), "ElementTetP1 or ElementTetP2", ("mesh_stiffness", "contact_nodes"), whole=True),
+    EDGES,
+)  # fmt: skip
 NEAR_RADII = 1.05
 """Of the tip: nodes so near to its centre may touch, as what it presses moves away from it."""
 MOVED_M = 2e-5
@@ -72,6 +79,7 @@ class ScikitFem(Adapter):
     }
 
     settings = SETTINGS
+    tunables = TUNABLES
 
     def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
         super().__init__(model, options, friction)

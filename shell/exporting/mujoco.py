@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.exporting.subject import Subject
+from palpate.render.options import BEST
 from palpate.render.simulators.mujoco import MuJoCo, scene_xml
 
 FILE_SETTINGS = "material=1,skin_m=1e-4"
@@ -25,9 +26,9 @@ def _row(values: np.ndarray) -> str:
     return " ".join(f"{value:.9g}" for value in values)
 
 
-def text_of(subject: Subject) -> str:
+def text_of(subject: Subject, numbers: str = FILE_SETTINGS, settings: str = BEST) -> str:
     """The MJCF scene; `ctrl` of its three actuators leads the tip's centre away from its start, in metres."""
-    run = subject.as_run(MuJoCo, FILE_SETTINGS)
+    run = subject.as_run(MuJoCo, numbers, settings)
     mesh = run.mesh_under(subject.near, subject.radius_m)
     middle, span = mesh.points.mean(axis=0), float(np.ptp(mesh.points, axis=0).max())
     drive = f'kp="{DRIVE_N_PER_M:g}" dampratio="1" ctrlrange="-{span:.6g} {span:.6g}"'

@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate.exporting.subject import Subject
 from palpate.mechanics.extras import install_words
+from palpate.render.options import BEST
 from palpate.render.simulators.base import ScriptedAdapter
 from palpate.render.simulators.drake import Drake
 from palpate.render.simulators.newton import Newton
@@ -47,7 +48,13 @@ def write_drake(path: Path, subject: Subject) -> tuple[str, ...]:
 
 
 def _write(path: Path, subject: Subject, kind: type[ScriptedAdapter]) -> tuple[str, ...]:
-    run = subject.as_run(kind)
+    path.write_text(text_of(subject, kind), encoding="utf-8")
+    return subject.run_notes(kind)
+
+
+def text_of(subject: Subject, kind: type[ScriptedAdapter], numbers: str = "", settings: str = BEST) -> str:
+    """The script, at its best settings or others."""
+    run = subject.as_run(kind, numbers, settings)
     given = run.given(run.mesh_under(subject.near, subject.radius_m), subject.radius_m)
     press = _PRESS.substitute(
         start=subject.near.tolist(),
@@ -58,8 +65,7 @@ def _write(path: Path, subject: Subject, kind: type[ScriptedAdapter]) -> tuple[s
     package, _, name = kind.scene_module.rpartition(".")
     scene = files(package).joinpath(f"{name}.py").read_text(encoding="utf-8")
     head = f"# {subject.label}\n# {install_words(kind.extra)}; python FILE\n"
-    path.write_text(head + scene + press, encoding="utf-8")
-    return subject.run_notes(kind)
+    return head + scene + press
 
 
 def _written(value: Any) -> str:

@@ -61,15 +61,15 @@ class Subject:
         own = "mu" in self.model.effects.get(SLIP.name, {})
         return f"friction {self.friction:g}, " + ("of the model" if own else "as the model names none")
 
-    def as_run(self, kind: type[A], numbers: str = "") -> A:
-        """The adapter that `palpate replay --renderer` runs at its best settings; numbers: those changed
-        (`--simulator-set`)."""
-        options = RenderOptions(simulator_settings=BEST, simulator_set=numbers)
+    def as_run(self, kind: type[A], numbers: str = "", settings: str = BEST) -> A:
+        """The adapter that `palpate replay --renderer` runs at its best settings, or others; numbers: those
+        changed (`--simulator-set`)."""
+        options = RenderOptions(simulator_settings=settings, simulator_set=numbers)
         return kind(self.model, options, friction_of(self.model, options))
 
-    def run_notes(self, kind: type[Adapter], numbers: str = "") -> tuple[str, ...]:
+    def run_notes(self, kind: type[Adapter], numbers: str = "", settings: str = BEST) -> tuple[str, ...]:
         """Of such a scene: how it is run here, and what of the model it does not hold, a line each."""
-        run = f"--renderer {kind.name} --simulator-settings {BEST}"
+        run = f"--renderer {kind.name} --simulator-settings {settings}"
         run += f" --simulator-set {numbers}" if numbers else ""
         notes = [
             f"what palpate replay {run} runs",

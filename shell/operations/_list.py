@@ -38,6 +38,7 @@ OPERATIONS = {
     "press": Entry("run one scripted press on a model, headless", "press"),
     "compare": Entry("compare FEM with spring-damper models, or two recordings", "compare changes"),
     "diagnose": Entry("find which effect a simulation leaves out, where, and how large it is", "diagnose"),
+    "tune": Entry("tune another simulator to the measured force, its physics held", "tune"),
     "calibrate": Entry("calibrate the instrument by presses on a known object", "calibrate"),
     "touch": Entry("feel a model or scene at 1 kHz", "touch"),
     "devices": Entry("list the devices, and why some are not available"),

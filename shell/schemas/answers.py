@@ -36,6 +36,7 @@ from palpate.schemas.gaps import (
     SOLVED,
     SOLVED_PLACES,
     TEXTS,
+    TUNE,
 )
 
 PLAIN = named(either(NUMBER, TEXT, FLAG, many(ANYTHING), {"type": "object"}, {"type": "null"}))
@@ -330,6 +331,7 @@ ANSWERS: dict[str, Form] = {
     "simulate": SIMULATE,
     "bench": named(ANYTHING),
     "conformance": CONFORMANCE,
+    "tune": TUNE,
     "batch": BATCH,
 }
 """By command; `calibrate` gives what TOOL.toml holds (`palpate.schemas.schema`)."""

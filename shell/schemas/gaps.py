@@ -208,6 +208,31 @@ _STATE = {
     "update_s": named(NUMBER),
     "trouble": TEXT,
 }
+_MOVED = table({"name": TEXT, "before": MAYBE, "after": MAYBE, "term": TEXT})
+_UNSEEN = table(
+    {"name": TEXT, **dict.fromkeys(("gap_before_n", "gap_after_n", "bound_n", "force_n"), NUMBER)}
+)
+_PRICED = table({"ms_per_step": NUMBER, "s_per_s": NUMBER, "gap_n": NUMBER, "moved": named(MAYBE)})
+TUNE = table(
+    {
+        "simulator": table({"name": TEXT, "version": TEXT}),
+        "settings": named(MAYBE),
+        "began": named(MAYBE),
+        "moved": many(_MOVED),
+        **dict.fromkeys(("gap_before_n", "gap_after_n", "fitted_before_n", "fitted_after_n"), NUMBER),
+        **dict.fromkeys(("noise_n", "law_n", "target_n", "least_n"), NUMBER),
+        "unseen_shapes": many(_UNSEEN),
+        **dict.fromkeys(("ms_per_step_before", "ms_per_step", "s_per_s", "seconds"), NUMBER),
+        "front": many(_PRICED),
+        "modulus_would": table({"factor": NUMBER, "gap_after_n": NUMBER}),
+        "modulus_moved": NUMBER,
+        "trials": COUNT,
+        "time_is_up": FLAG,
+        "worse": TEXTS,
+        "effects": TEXTS,
+        "notes": TEXTS,
+    }
+)
 _SUGGESTED = table(
     {"kind": TEXT, "why": TEXT},
     point=VECTOR,

@@ -45,6 +45,7 @@ _KINDS: dict[str, str | ModuleType] = {
     "palpate.diagnosis.compare.before_after.Changes": "changes",
     "palpate.diagnosis.verdict.result.Diagnosis": "diagnosis",
     "palpate.diagnosis.other_simulator.result.SimulatedGap": "other_simulator",
+    "palpate.diagnosis.other_simulator.tuned.Tuned": "tuned",
     "palpate.diagnosis.explore.suggestion.Explored": "exploration",
     "palpate.diagnosis.specimen.result.Material": "material",
     "palpate.scenes.laboratory.simulate.Simulation": "simulation",

@@ -92,7 +92,7 @@ def test_what_only_a_later_step_tried_has_its_numbers_too(delayed):
     )
     findings = dataclasses.replace(findings, found=found)
     counts = findings.search.whitener.counts()
-    gaps, rng = held_out_gaps(findings), np.random.default_rng(0)
+    gaps = held_out_gaps(findings)
     entry = entries_of(findings, answer_of(findings, counts), gaps, counts)[0]
     assert entry.name == "time_delay" and entry.parameters["delay_s"] == pytest.approx(0.02, abs=0.002)
     assert entry.gap_closed == pytest.approx(delayed[2].entries[0].gap_closed, abs=0.02)

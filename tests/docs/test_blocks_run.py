@@ -97,6 +97,7 @@ ELSEWHERE = {
     "palpate open palpation.csv": "tests/reconstruct/test_sliding_on_a_slab.py",
     "palpate reconstruct": "tests/reconstruct/test_command.py",
     "palpate simulate": "tests/scenes/laboratory",
+    "palpate tune": "tests/diagnose/test_tuning.py",
     "palpate touch": "tests/shell/window/test_touch_command.py",
     "eval": "tests/shell/test_help.py",
     "howto/batch.md python": "examples/plot_13_a_batch.py",

@@ -32,11 +32,11 @@ def test_import_loads_nothing_heavy():
 def test_door_is_what_was_promised():
     promised = "read_recording reconstruct load renderer replay press compare diagnose simulate batch "
     promised += "check import_table read_table model_of export options material calibrate changes "
-    promised += "open recording conformance touch"
+    promised += "open recording conformance touch tune"
     assert set(FUNCTIONS) == set(promised.split())
     assert set(RESULTS) == set(
         "Recording Model Reconstruction ReplayResult Curve Comparison Diagnosis Simulation Batch "
-        "Checkup Imported Opened Material Calibration Changes SimulatedGap".split()
+        "Checkup Imported Opened Material Calibration Changes SimulatedGap Tuned".split()
     )
     assert all(issubclass(getattr(pp, name), pp.PalpateError) for name in ERRORS)
     with pytest.raises(AttributeError, match="no attribute 'replay_recording'.*replay"):
