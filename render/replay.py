@@ -116,7 +116,7 @@ def replay_touches(
     """
     scene, t = scene_of(touched), recording.t
     forces = np.zeros((len(t), 3))
-    numbers = np.flatnonzero(chosen)
+    numbers = np.flatnonzero(chosen).tolist()
     parts = [rows_of_touch(t, presses, p) for p in numbers]
     whole, done, left = sum(part.stop - part.start for part in parts), 0, Remaining()
     left.tell(0.0)
@@ -133,7 +133,7 @@ def replay_touches(
             except OptionError as error:
                 if failed is None:
                     raise
-                failed(int(numbers[k - 1]), error)
+                failed(numbers[k - 1], error)
                 forces[own] = 0.0
                 done += own.stop - first
                 break

@@ -128,8 +128,9 @@ class Runs:
         except OptionError as error:
             force, ended = np.zeros_like(path.centre), (f"{path.name}: {error}",)
         at = np.column_stack([np.interp(path.at_s, path.t, f) for f in force.T])
+        spent, simulated = (_cost(made) - before).tolist()
         sums = Sums(
             float(((at - path.force) ** 2).sum()), float((at * path.force).sum()), float((at**2).sum()),
-            float((path.force**2).sum()), len(at), *(float(x) for x in _cost(made) - before), ended,
+            float((path.force**2).sum()), len(at), spent, simulated, ended,
         )  # fmt: skip
         return sums, force

@@ -199,8 +199,9 @@ class TouchWindow:
             (self._aside, (right, 0.0, 1.0, 1.0) if self.aside else (0.0, 0.0, 0.01, 0.01)),
         ):
             renderer.viewport = viewport
-        for drawn in (self._charts, *self.pictures):
-            drawn.scale(scale)
+        self._charts.scale(scale)
+        for picture in self.pictures:
+            picture.scale(scale)
         for board in self.boards:
             board.changed = True
         column, aside = self.boards
