@@ -19,6 +19,8 @@ from palpate.mechanics.quantities import number_words
 
 HERTZ = 1.5
 """Power of the depth with which a sphere's force goes."""
+_BENT = 0.03
+"""Standard deviation of the power of a right force, as our own law bends: what is no more is a factor."""
 _LEAST = 1e-3
 """Of the median press's force: below it a power says nothing."""
 
@@ -65,5 +67,5 @@ EFFECT = NumericalEffect(
     change=_change,
     advice="take a contact that solves the solid (finite elements under the tip) instead of a pressure field "
     "or springs a node; a contact modulus fits one depth alone",
-    hints=SearchHints(hides_strain=True, stands_for_strain=True, any_form=True),
+    hints=SearchHints(hides_strain=True, stands_for_strain=True, any_form=True, untold=(_BENT, np.inf)),
 )

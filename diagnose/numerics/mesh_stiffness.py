@@ -62,7 +62,8 @@ EFFECT = NumericalEffect(
     report=_report,
     keys_in_words=_words,
     change=_change,
-    advice="refine the mesh, use quadratic elements, or lower Poisson's ratio by steps (0.49, 0.47, 0.45) "
-    "until the force no longer changes; check that the modulus is the one stated",
+    advice="check that the modulus is the one stated, and the force's unit; if it is too stiff, refine the "
+    "mesh, use quadratic elements, or lower Poisson's ratio by steps (0.49, 0.47, 0.45) until the force no "
+    "longer changes",
     hints=SearchHints(),
 )

@@ -16,6 +16,10 @@ from palpate.mechanics.plausible import SAMPLE_RATE
 from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
 _SEARCH_S, _SURE = 3.0, 0.5
+_EVEN = 1e-4
+"""Share by which the mean of even steps is off their median."""
+_FEW = 0.5
+"""Share of rows with a time of their own, below which whole seconds are not the time."""
 _MOST_HZ = 2000.0
 POINTS_HZ = 100.0
 """Rows without a time are numbered by this clock, and readings slower than a recording's put on it."""
@@ -60,6 +64,11 @@ def stream_of(
     if t is not None:
         t, values = _in_order(part, t, values, said, notes)
         fresh = np.concatenate([[True], np.diff(t) > 0])
+        if fresh.mean() < _FEW and (t[fresh] % 1 == 0).all():
+            raise RecordingError(
+                f"the time of the {part} is whole seconds, and {100 * (1 - fresh.mean()):.1f} % of its rows "
+                "repeat them: name a column that runs (--column t=NAME), or leave it out and give --rate HZ"
+            )
         if not fresh.all():
             notes.append(f"{part}: {int((~fresh).sum())} rows repeat an earlier time and are left out")
         t, values = t[fresh], values[fresh]
@@ -115,7 +124,11 @@ def one_clock(
     together = all(
         len(t) == len(times["position"]) and np.array_equal(t, times["position"]) for t in times.values()
     )
-    rate = float(f"{1 / np.median(np.diff(times['position'])):.9g}")  # 1000, not 999.9999999952
+    step = float(np.median(np.diff(times["position"])))
+    mean = float(np.ptp(times["position"])) / (len(times["position"]) - 1)
+    if abs(mean / step - 1) < _EVEN:
+        step = mean  # nanoseconds since 1970 are known to 256 of them, which a median does not average
+    rate = float(f"{1 / step:.9g}")  # 1000, not 999.9999999952
     if together and said.offset_s in (None, 0, 0.0) and not said.rate_hz and rate >= SAMPLE_RATE.low:
         t = times["position"] - times["position"][0]
         return t, place.values, push.values, None if turn is None else turn.values, rate

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from palpate.importing.tables import Table
-from palpate.importing.units import SI, plain, unit_in, without_unit
+from palpate.importing.units import SI, plain, unit_in, unit_since_1970, without_unit
 from palpate.importing.vocabulary import says, vocabulary
 from palpate.mechanics.disk.reading import read_toml
 from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
@@ -236,6 +236,8 @@ def _column(
     if kind is None:
         return Column(role, table, name, sign, "1", guessed)
     unit = plain(said.units[kind]) if kind in said.units else unit_in(name, kind)
+    if unit is None and kind == "time":
+        unit = unit_since_1970(np.asarray(table.columns[name], dtype=float))
     assumed = unit is None
     unit = unit or next(iter(SI[kind]))
     return Column(role, table, name, sign * SI[kind][unit], unit, guessed, assumed, kind in said.units)

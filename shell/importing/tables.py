@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
@@ -66,9 +67,29 @@ def read_tables(path: Path | str) -> list[Table]:
 
 
 def _numbers(table: Table) -> Table:
-    """Without columns that hold no finite number."""
+    """Without columns that hold no finite number, and with each stamp's seconds and nanoseconds in one."""
     kept = {name: np.asarray(v, dtype=float) for name, v in table.columns.items()}
-    return Table(table.name, {name: v for name, v in kept.items() if np.isfinite(v).any()})
+    return Table(table.name, _stamped({name: v for name, v in kept.items() if np.isfinite(v).any()}))
+
+
+_SECONDS = re.compile(r"(.*?)[._/]?secs?")
+
+
+def _stamped(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """ROS writes a time as whole seconds beside nanoseconds: the first takes in the second."""
+    found: dict[str, np.ndarray] = {}
+    for name, values in columns.items():
+        seconds = _SECONDS.fullmatch(name)
+        stem = name.removesuffix("s").removesuffix("sec")
+        fraction = next((f"{stem}{n}" for n in _FRACTIONS if f"{stem}{n}" in columns), None)
+        if seconds is None or fraction is None:
+            found[name] = values
+        else:
+            found[seconds[1] or "stamp"] = values + 1e-9 * columns[fraction]
+    return found
+
+
+_FRACTIONS = ("nanosec", "nanosecs", "nsec", "nsecs")
 
 
 def by_length(name: str, held: Mapping[str, np.ndarray]) -> list[Table]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
+
 from palpate.mechanics.quantities import parse_unit
 
 _SPELT = {
@@ -19,6 +21,17 @@ SI = {
 """Kind of quantity -> unit -> what one is in SI."""
 _BRACKETS = re.compile(r"[\[({]\s*([^\])}\d][^\])}]*?)\s*[\])}]\s*(?:#\d+)?$")
 _TAIL = re.compile(r"(?:\s*[_/,]\s*|\s+)([A-Za-zµμ]+)$")
+
+
+_EPOCH_S = (1e9, 2.2e9)
+"""Seconds since 1970 from 2001 to 2039."""
+
+
+def unit_since_1970(t: np.ndarray) -> str | None:
+    """The unit of times (n,) that count from 1970 in ms, us or ns; None where they do not."""
+    middle = float(np.median(t[np.isfinite(t)])) if np.isfinite(t).any() else 0.0
+    low, high = _EPOCH_S
+    return next((u for u in ("ms", "us", "ns") if low < middle * SI["time"][u] < high), None)
 
 
 def plain(unit: str) -> str:

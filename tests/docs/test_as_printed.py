@@ -55,5 +55,6 @@ def test_the_gap_of_forces_in_a_file_is_told_by_the_command_that_the_page_prints
     assert cli.main([*printed(), *beside_it, "--json", "gap.json"]) == 0
     told = json.loads((beside / "gap.json").read_text())
     assert 0 < told["gap_after_n"] < told["gap_before_n"]
+    assert "force_law" not in told["verdict"]["effects"]  # a factor is no other power
     page = (beside / "why.html").read_text(encoding="utf-8")
     assert re.search(r'<p class="lead">It is off by', page) and '<details class="chapter"' in page

@@ -241,3 +241,43 @@ def test_files_as_people_export_them_are_right_or_asked(tmp_path, seed):
 def test_what_nobody_had_tried_is_right_or_asked(tmp_path, seed):
     outcome = outcome_of(strange_export(tmp_path, seed))
     assert outcome in ("understood and right", "asked", "refused with a cure")
+
+
+def _logged(times: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns of a log in m and N at 200 Hz, its times as given."""
+    t = np.arange(2000) / 200
+    depth = 0.006 * np.sin(np.pi * t) ** 2 - 0.001
+    place = {"pose.x": 0.01 * np.floor(t), "pose.y": 0 * t, "pose.z": -depth}
+    return {**times, **place, "force.x": 0 * t, "force.y": 0 * t, "force.z": 400 * np.maximum(depth, 0)}
+
+
+def _written(path, columns):
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join(columns), *(",".join(f"{v:.9g}" if v % 1 else f"{v:.0f}" for v in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        {"header.stamp": 1732794000 * 10**9 + 5 * 10**6 * np.arange(2000)},
+        {"%time": 1732794000 * 10**3 + 5 * np.arange(2000)},
+        {
+            "stamp.secs": 1732794000 + np.arange(2000) // 200,
+            "stamp.nsecs": 5 * 10**6 * (np.arange(2000) % 200),
+        },
+        {"sec": 1732794000 + np.arange(2000) // 200, "nanosec": 5 * 10**6 * (np.arange(2000) % 200)},
+    ],
+    ids=["nanoseconds", "milliseconds", "seconds and nanoseconds", "ROS 2"],
+)
+def test_stamps_since_1970_are_read_as_the_robot_writes_them(times, tmp_path):
+    read = pp.import_table(_written(tmp_path / "log.csv", _logged(times)), tip_radius_m=0.004).recording
+    assert read.t[-1] == pytest.approx(1999 / 200, abs=1e-5)
+    assert read.sample_rate_hz == pytest.approx(200, rel=1e-6)
+
+
+def test_whole_seconds_alone_are_no_time(tmp_path):
+    log = _written(tmp_path / "log.csv", _logged({"sec": 1732794000 + np.arange(2000) // 200}))
+    with pytest.raises(RecordingError, match="whole seconds.*--column t=NAME"):
+        pp.import_table(log, tip_radius_m=0.004)
