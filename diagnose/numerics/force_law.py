@@ -19,7 +19,7 @@ from palpate.mechanics.quantities import number_words
 
 HERTZ = 1.5
 """Power of the depth with which a sphere's force goes."""
-_BENT = 0.03
+_BENT = 0.01
 """Standard deviation of the power of a right force, as our own law bends: what is no more is a factor."""
 _LEAST = 1e-3
 """Of the median press's force: below it a power says nothing."""
