@@ -66,13 +66,9 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
         vertices, triangles = _cut(vertices, triangles, normal, sink_m)
     foot = _foot(vertices, triangles, normal)
     if _share(vertices, triangles, foot) < _LEAST_FOOT:
-        others = [
-            u for u in UPS
-            if _share(vertices, triangles, _foot(vertices, triangles, direction(u))) >= _LEAST_FOOT
-        ]  # fmt: skip
-        hint = f"its flat ones are for --up {', '.join(others)}; or " if others else ""
         raise SurfaceError(
-            f"'{surface.name}' has no flat foot to stand on with {up} up: {hint}{_way(surface, normal)}"
+            f"'{surface.name}' has no flat foot to stand on with {up} up: "
+            f"{_feet(surface)}{_way(surface, normal)}"
         )
     hanging = _hanging(vertices, triangles, foot)
     if hanging > _HANGING:
@@ -94,6 +90,23 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
     area = triangle_areas(vertices, triangles[foot])
     middle = np.average(vertices[triangles[foot]].mean(axis=1), axis=0, weights=area)
     return Standing(vertices, triangles, middle, normal)
+
+
+def _feet(surface: ClosedSurface) -> str:
+    """The ways up in which it stands flat, in words: along the file's axes, else on its largest flat face."""
+    vertices, triangles = surface.vertices, surface.triangles
+    feet = {up: _foot(vertices, triangles, direction(up)) for up in UPS}
+    share = {up: _share(vertices, triangles, foot) for up, foot in feet.items()}
+    flat = [
+        up for up in sorted(UPS, key=lambda up: -round(share[up], 3))
+        if share[up] >= _LEAST_FOOT and not _is_point(vertices, triangles, feet[up], direction(up))
+    ]  # fmt: skip
+    if flat:
+        return f"its flat ones are for --up {', '.join(flat)}; or "
+    tilted = _tilted(vertices, triangles, direction("+z"), 180.0)
+    return (
+        "" if tilted is None else f"its flat foot is for --up={','.join(f'{x:.4g}' for x in tilted[2])}; or "
+    )
 
 
 def direction(up: str) -> np.ndarray:
@@ -186,10 +199,11 @@ def _righted(surface: ClosedSurface, up: str, normal: np.ndarray) -> np.ndarray:
 
 
 def _tilted(
-    vertices: np.ndarray, triangles: np.ndarray, normal: np.ndarray
+    vertices: np.ndarray, triangles: np.ndarray, normal: np.ndarray, most: float = _TILT
 ) -> tuple[float, float, np.ndarray] | None:
-    """The angle (degrees) of the largest flat face that an object can stand on, near the stated plane; the
-    share of it on that plane; and the direction (3,) out of it. None where the object stands as stated."""
+    """The angle of the largest flat face that an object can stand on, within `most` degrees of the stated
+    plane; the share of it on that plane; and the direction (3,) out of it. None where the object stands as
+    stated."""
     size = float(np.ptp(vertices, axis=0).max())
     corners = vertices[triangles]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -199,7 +213,7 @@ def _tilted(
     a, b, c = (vertices[hull.simplices[:, k]] for k in range(3))
     large = np.argsort(np.linalg.norm(np.cross(b - a, c - a), axis=1))[::-1]
     planes = hull.equations[large]
-    planes = planes[planes[:, :3] @ normal < -np.cos(np.radians(_TILT))][:50]
+    planes = planes[planes[:, :3] @ normal <= -np.cos(np.radians(most))][:50]
 
     def on(plane: np.ndarray) -> np.ndarray:
         off = np.abs(vertices @ plane[:3] + plane[3])[triangles].max(axis=1)

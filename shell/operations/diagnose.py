@@ -220,6 +220,7 @@ def diagnose(
         call.following = [f"next: feel it: palpate touch {apply}"]
     if corrected:
         call.then(partial(_corrected, own, corrected))
+        call.following = [f"next: reconstruct what is left: palpate reconstruct {corrected} -o MODEL"]
     call.then_report(result, report)
     return result
 

@@ -343,8 +343,9 @@ def _check(
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
         raise DeviceError(
-            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): use --headless, a desktop, or "
-            "'xvfb-run -s \"-screen 0 1280x800x24\" palpate touch ...'"
+            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): press it in a browser "
+            "(`palpate export SCENE --to page -o touch.html`), use `palpate touch --headless`, or "
+            "'xvfb-run -s \"-screen 0 1280x800x24\" palpate ...'"
         )
 
 

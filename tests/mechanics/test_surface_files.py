@@ -263,6 +263,24 @@ def test_up_is_a_direction_of_the_file():
         standing(surface_of(leaning))
 
 
+def test_a_foot_of_any_direction_is_named_where_none_lies_along_an_axis():
+    """As a scanner's frame has it; a round top is no foot."""
+    dome = trimesh.creation.icosphere(subdivisions=4, radius=0.05)
+    cut = pyvista.wrap(dome).clip_closed_surface((0, 0, 1), origin=(0, 0, -0.02)).triangulate().clean()
+    dome = trimesh.Trimesh(cut.points, cut.regular_faces)
+    turn = trimesh.transformations.rotation_matrix(np.radians(44), [1, 0.4, 0.1])
+    dome.apply_transform(turn)
+    with pytest.raises(SurfaceError, match=r"its flat foot is for --up=") as refused:
+        standing(surface_of(dome))
+    up = str(refused.value).split("--up=")[1].split(";")[0]
+    assert standing(surface_of(dome), up).support_normal == pytest.approx(turn[:3, 2], abs=1e-3)
+    level = dome.copy()
+    level.apply_transform(np.linalg.inv(turn))
+    level.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    with pytest.raises(SurfaceError, match=r"flat ones are for --up -y; or"):
+        standing(surface_of(level))
+
+
 def test_a_sink_that_is_proposed_makes_the_object_stand():
     """Round undersides, one of two bodies, one 6 mm higher: each value is taken as it is said."""
     ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)

@@ -149,7 +149,7 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
     if not asked:
         yield feel_step(model.path, f"palpate reconstruct {recording} -o MODEL")
     if result.next_touch is not None and result.unsettled:
-        yield "touch once more at the place given below, to decide between the candidates"
+        yield "touch once more, at the place of the next touch, to decide between the candidates"
 
 
 def _caption(result: Diagnosis) -> str:
