@@ -221,9 +221,9 @@ def test_what_is_no_option_is_told_before_any_work(name, recording, rooms):
         ({"renderer": "mujoco", "stated": ["frction=0.5"]}, "--stated frction: not known; allowed are young"),
         (
             {"renderer": "mujoco", "simulator_set": "solref=1"},
-            "--simulator-set solref=1: allowed are damping",
+            "--simulator-set solref=1: allowed are cone",
         ),
-        ({"renderer": "mujoco", "mended": "best,solref=1"}, "solref=1: allowed are damping"),
+        ({"renderer": "mujoco", "mended": "best,solref=1"}, "solref=1: allowed are cone"),
         ({"presses": 12}, "--presses says over how many a simulator is run: name it by --renderer"),
     ],
 )
