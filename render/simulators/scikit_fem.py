@@ -103,7 +103,7 @@ class _Solved:
         from skfem.models.elasticity import lame_parameters, linear_elasticity
 
         material = model.material
-        linear = skfem.MeshTet(mesh.points.T, mesh.tetrahedra.T)
+        linear = skfem.MeshTet(*(np.ascontiguousarray(x.T) for x in (mesh.points, mesh.tetrahedra)))
         element = skfem.ElementTetP1() if order == 1 else skfem.ElementTetP2()
         basis = skfem.Basis(linear, skfem.ElementVector(element))
         lame = lame_parameters(material.young_modulus_pa, material.poisson_ratio)
