@@ -52,12 +52,12 @@ class Tuned(Result):
     """The smallest change of a simulator's settings that meets the measured force, its physics held.
 
     settings: of all that may be tuned; began: the same before. chosen, numbers: `--simulator-settings` and
-    `--simulator-set` of the start. gap_*_n: N rms on held-out presses; fitted_*_n: on those tuned on;
-    noise_n: of the sensor; law_n: what an ideal elastic simulation leaves of the latter; target_n: where
-    tuning ends; least_n: the least that any settings reached. scale, scaled_n: the factor on the modulus
-    that would come nearest, and what it would leave. modulus_moved: share by which the modulus that the
-    simulator was given is off the model's. named: numerical effects of the diagnosis. `plot`: error
-    over cost; `show`: nothing.
+    `--simulator-set` of the start. gap_before_n, gap_after_n: N rms on held-out presses; fitted_before_n,
+    fitted_after_n: on those tuned on; noise_n: of the sensor; law_n: what an ideal elastic simulation leaves
+    of the latter; target_n: where tuning ends; least_n: the least that any settings reached. scale, scaled_n:
+    the factor on the modulus that would come nearest, and what it would leave. modulus_moved: share by which
+    the modulus that the simulator was given is off the model's. named: numerical effects of the diagnosis.
+    `plot`: error over cost; `show`: nothing.
     """
 
     simulator: str
