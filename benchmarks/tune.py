@@ -14,7 +14,7 @@ import json
 import tempfile
 import time
 from contextlib import chdir
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.diagnosis.other_simulator.runs import Runs, TruePath
 from palpate.diagnosis.other_simulator.tuned import Judged, Tuned, off, tuned
+from palpate.operations.tune import path_of_body
 from palpate.output import progress_bar
 from palpate.render.options import BEST, DOCUMENTED, RenderOptions
 from palpate.render.simulators.base import over
@@ -93,11 +94,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def first_press(name: str) -> TruePath:
     """The first of the two presses of a body of the kit: the way in, and the hold."""
-    body = scaled_body(name)
-    rows = slice(0, int(np.searchsorted(body.t, UNTIL_S)))
-    bound = float(np.sqrt((body.bound[rows] ** 2).mean()))
-    t, centre = body.t[rows], body.centre[rows]
-    return TruePath(name, body.model, t, centre, t, body.force[rows], bound, body.friction)
+    return path_of_body(scaled_body(name), UNTIL_S)
 
 
 @dataclass(frozen=True)
@@ -122,8 +119,7 @@ def identified(runs: Runs, path: TruePath, within_s: float) -> _Identified:
 
 def stiffer(path: TruePath, factor: float) -> TruePath:
     """The same press of a body that is given another modulus; its true force stays."""
-    model = path.model.with_modulus(factor * path.model.material.young_modulus_pa)
-    return TruePath(path.name, model, path.t, path.centre, path.at_s, path.force, path.bound_n, path.friction)
+    return replace(path, model=path.model.with_modulus(factor * path.model.material.young_modulus_pa))
 
 
 def case(name: str, planted: dict[str, float], within_s: float) -> dict[str, Any]:

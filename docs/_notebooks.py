@@ -19,15 +19,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from palpate.operations._list import OPERATIONS
 from palpate.operations._run import command_operation, parser_of
+from tools.tutorials import BLOCK, PAGES, commands
 
-TUTORIALS = Path(__file__).resolve().parent / "tutorials"
 NAMES = ("first-touch", "two-minutes", "first-diagnosis")
-BLOCK = re.compile(
-    r"(?:^<!-- notebook: (?P<instead>.*?) -->\n)?^```(?P<kind>sh|python)\n(?P<code>.*?)^```\n",
-    re.DOTALL | re.MULTILINE,
-)
 AFTERWARDS = {
     "report": ".report({})",
     "corrected": ".corrected().save({})",
@@ -41,6 +38,8 @@ def notebook(page: Path) -> dict[str, Any]:
     text, at = page.read_text(encoding="utf-8"), 0
     cells: list[dict[str, Any]] = []
     for block in BLOCK.finditer(text):
+        if block["kind"] not in ("sh", "python"):
+            continue
         cells += _words(text[at : block.start()], page.parent)
         cells += map(_code, _cells_of(block))
         at = block.end()
@@ -59,8 +58,7 @@ def _cells_of(block: re.Match[str]) -> list[str]:
         return [block["code"].rstrip()]
     if block["instead"]:
         return [f"# in a notebook a simulated hand does it\n{call(block['instead'])}"]
-    joined = block["code"].replace("\\\n", " ").splitlines()
-    return [call(re.sub(r"\s+#\s.*", "", line)) for line in joined if line.strip()]
+    return [call(line) for line in commands(block)]
 
 
 def call(line: str) -> str:
@@ -120,7 +118,7 @@ def write(folder: Path) -> None:
     """A notebook a tutorial."""
     folder.mkdir(parents=True, exist_ok=True)
     for name in NAMES:
-        made = json.dumps(notebook(TUTORIALS / f"{name}.md"), indent=1, ensure_ascii=False) + "\n"
+        made = json.dumps(notebook(PAGES / f"{name}.md"), indent=1, ensure_ascii=False) + "\n"
         (folder / f"{name}.ipynb").write_text(made, encoding="utf-8")
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,8 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from palpate.devices.channel import PoseChannel
-from palpate.devices.registry import DeviceChoice
 from palpate.diagnosis.explore.explorer import Explorer
 from palpate.diagnosis.explore.goals import GoalOptions
 from palpate.diagnosis.explore.segments import Instrument
@@ -29,8 +26,7 @@ from palpate.scenes.build import model_of
 from palpate.scenes.scene import load_scene
 from palpate.window.guide import Guide
 from palpate.window.session import SessionOptions, TouchSession
-from palpate.window.window import TouchWindow
-from tests.shell.window.driven import Driven, as_the_ghost_says
+from tests.shell.window.driven import Driven, as_the_ghost_says, driving
 from tools.script import script
 
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "guided-session.png"
@@ -73,24 +69,18 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 @contextmanager
 def _guided() -> Iterator[tuple[Driven, Guide]]:
     scene = load_scene("nodule")
-    channel = PoseChannel.create()
-    channel.write(time.perf_counter(), (0.0, 0.0, 0.1))
-    device = DeviceChoice("mouse", {"channel": str(channel.path)})
-    options = SessionOptions(scene.renderer)
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        TouchSession(model_of(scene), title=scene.title, device=device, options=options) as session,
-    ):
-        session.start()
-        session.enable()
-        servo, nu = session.servo, session.model.material.poisson_ratio
-        instrument = Instrument(servo.tip_radius_m, servo.options.rate_hz, {"poisson_ratio": nu})
-        explorer = Explorer(instrument, GOALS, poisson_ratio=nu)
-        guide = Guide(explorer, servo, session.model, session.worker, Path(folder) / "guided.csv.gz")
-        window = TouchWindow(session, scene, channel, off_screen=True, size=SIZE, guide=guide)
-        yield Driven(window), guide
-        window.plotter.close()
-    channel.close()
+    with tempfile.TemporaryDirectory() as folder:
+
+        def guided(session: TouchSession) -> Guide:
+            servo, nu = session.servo, session.model.material.poisson_ratio
+            instrument = Instrument(servo.tip_radius_m, servo.options.rate_hz, {"poisson_ratio": nu})
+            explorer = Explorer(instrument, GOALS, poisson_ratio=nu)
+            return Guide(explorer, servo, session.model, session.worker, Path(folder) / "guided.csv.gz")
+
+        options = SessionOptions(scene.renderer)
+        with driving(model_of(scene), scene, options, guided=guided, size=SIZE) as driven:
+            assert driven.window.guide is not None
+            yield driven, driven.window.guide
 
 
 def _trace(driven: Driven, guide: Guide) -> np.ndarray:

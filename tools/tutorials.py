@@ -41,14 +41,19 @@ def steps(name: str, screen: bool) -> list[tuple[str, str]]:
         if block["kind"] == "python" and (saved := SAVED_AS.findall(before)):
             found += [(saved[-1], block["code"]), ("command", f"python {saved[-1]}")]
         elif block["kind"] == "sh":
-            lines = block["code"].replace("\\\n", " ").splitlines()
-            lines = [re.sub(r"\s+#\s.*", "", line) for line in lines if not NOT_HERE.match(line)]
+            lines = [line for line in commands(block) if not NOT_HERE.match(line)]
             if block["instead"] and not screen:
                 lines = [block["instead"]]
-            found += [("command", line if screen else without_window(line)) for line in lines if line.strip()]
+            found += [("command", line if screen else without_window(line)) for line in lines]
         elif block["kind"] == "text" and PRINTED.search(before):
             found.append(("printed", block["code"]))
     return found
+
+
+def commands(block: re.Match[str]) -> list[str]:
+    """Of a block of a shell, a line each, without remarks."""
+    joined = block["code"].replace("\\\n", " ").splitlines()
+    return [re.sub(r"\s+#\s.*", "", line) for line in joined if line.strip()]
 
 
 def without_window(line: str) -> str:

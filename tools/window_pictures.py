@@ -8,24 +8,19 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from palpate.devices.channel import PoseChannel
-from palpate.devices.registry import DeviceChoice
 from palpate.mechanics.disk.writing import PNG, atomic_file
 from palpate.operations.touch import DEFAULT, _gallery
 from palpate.scenes.build import model_of
 from palpate.scenes.scene import load_scene
-from palpate.window.session import SessionOptions, TouchSession
+from palpate.window.session import SessionOptions
 from palpate.window.waiting import WaitingWindow
-from palpate.window.window import TouchWindow
-from tests.shell.window.driven import Driven
+from tests.shell.window.driven import Driven, driving
 from tools.script import script
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
@@ -57,21 +52,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     return {"size_px": size}
 
 
-@contextmanager
-def _touched(name: str, size: tuple[int, int]) -> Iterator[Driven]:
+def _touched(name: str, size: tuple[int, int]) -> AbstractContextManager[Driven]:
     """The window of an embedded scene, with a hand on its mouse."""
     scene = load_scene(name)
-    channel = PoseChannel.create()
-    channel.write(time.perf_counter(), (0.0, 0.0, 0.1))
-    device = DeviceChoice("mouse", {"channel": str(channel.path)})
-    options = SessionOptions(scene.renderer, beside=scene.beside)
-    with TouchSession(model_of(scene), title=scene.title, device=device, options=options) as session:
-        session.start()
-        session.enable()
-        window = TouchWindow(session, scene, channel, off_screen=True, size=size)
-        yield Driven(window)
-        window.plotter.close()
-    channel.close()
+    return driving(model_of(scene), scene, SessionOptions(scene.renderer, beside=scene.beside), size=size)
 
 
 def _press(driven: Driven, x: float, y: float) -> None:

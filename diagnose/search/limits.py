@@ -208,9 +208,8 @@ class Products:
             mm_, rm_, rd_, md_, dd_ = (_summed(x, others) for x in (mm[None], rm, rd, md, dd))
             amplitude = np.zeros_like(rm)
             if column is not None:
-                least = np.maximum(
-                    _LEAST * dd.sum(axis=1, keepdims=True), 1e-300
-                )  # also of what is in one alone
+                # of all groups, as a column that one alone holds is nothing in the others
+                least = np.maximum(_LEAST * dd.sum(axis=1, keepdims=True), 1e-300)
                 amplitude += (rd_ - md_ * rm_ / mm_) / np.maximum(dd_ - md_**2 / mm_, least)
             found.append((self._left((rm_ - amplitude * md_) / mm_, amplitude, column), amplitude[:, 0]))
         (loss, by_all), (held, _) = found

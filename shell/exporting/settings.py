@@ -47,7 +47,7 @@ def write_settings(path: Path | str, tuned: Tuned) -> Path:
 def _named(tuned: Tuned, moved: str) -> str:
     """Settings by name, for a simulator whose scene is the user's own script."""
     material = tuned.model.material
-    rows = [f"    {json.dumps(name)}: {_number(value)}," for name, value in tuned.settings.items()]
+    rows = [f"    {json.dumps(name)}: {float(value)!r}," for name, value in tuned.settings.items()]
     given = f"young_modulus_pa={material.young_modulus_pa!r}, poisson_ratio={material.poisson_ratio!r}"
     return "\n".join([
         f"# Palpate tuned settings: {moved}",
@@ -61,7 +61,3 @@ def _named(tuned: Tuned, moved: str) -> str:
         "}",
         "",
     ])  # fmt: skip
-
-
-def _number(value: float) -> str:
-    return repr(float(value))

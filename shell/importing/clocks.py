@@ -64,10 +64,12 @@ def stream_of(
     if t is not None:
         t, values = _in_order(part, t, values, said, notes)
         fresh = np.concatenate([[True], np.diff(t) > 0])
-        if fresh.mean() < _FEW and (t[fresh] % 1 == 0).all():
+        one = fresh.sum() < 2
+        if one or (fresh.mean() < _FEW and (t[fresh] % 1 == 0).all()):
             raise RecordingError(
-                f"the time of the {part} is whole seconds, and {100 * (1 - fresh.mean()):.1f} % of its rows "
-                "repeat them: name a column that runs (--column t=NAME), or leave it out and give --rate HZ"
+                f"the time of the {part} is {'one moment' if one else 'whole seconds'}, and "
+                f"{100 * (1 - fresh.mean()):.1f} % of its rows repeat it: name a column that runs "
+                "(--column t=NAME), or leave it out and give --rate HZ"
             )
         if not fresh.all():
             notes.append(f"{part}: {int((~fresh).sum())} rows repeat an earlier time and are left out")

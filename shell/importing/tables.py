@@ -72,24 +72,29 @@ def _numbers(table: Table) -> Table:
     return Table(table.name, _stamped({name: v for name, v in kept.items() if np.isfinite(v).any()}))
 
 
-_SECONDS = re.compile(r"(.*?)[._/]?secs?")
+_SECONDS = re.compile(r"((.*?)[._/]?)secs?")
+_FRACTIONS = ("nanosec", "nanosecs", "nsec", "nsecs")
 
 
 def _stamped(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """ROS writes a time as whole seconds beside nanoseconds: the first takes in the second."""
     found: dict[str, np.ndarray] = {}
     for name, values in columns.items():
-        seconds = _SECONDS.fullmatch(name)
-        stem = name.removesuffix("s").removesuffix("sec")
-        fraction = next((f"{stem}{n}" for n in _FRACTIONS if f"{stem}{n}" in columns), None)
-        if seconds is None or fraction is None:
+        stamp, fraction = _beside(name, columns)
+        if fraction is None:
             found[name] = values
         else:
-            found[seconds[1] or "stamp"] = values + 1e-9 * columns[fraction]
+            found[stamp] = values + 1e-9 * columns[fraction]
     return found
 
 
-_FRACTIONS = ("nanosec", "nanosecs", "nsec", "nsecs")
+def _beside(seconds: str, columns: Mapping[str, np.ndarray]) -> tuple[str, str | None]:
+    """(what whole seconds are the time of, the column of nanoseconds beside them or None)."""
+    found = _SECONDS.fullmatch(seconds)
+    if found is None:
+        return seconds, None
+    beside = (f"{found[1]}{name}" for name in _FRACTIONS)
+    return found[2] or "stamp", next((name for name in beside if name in columns), None)
 
 
 def by_length(name: str, held: Mapping[str, np.ndarray]) -> list[Table]:
@@ -137,7 +142,7 @@ def of_messages(name: str, times_s: list[float], messages: list[dict[str, float]
     columns = {key: np.array([m[key] for m in messages]) for key in messages[0] if key in common}
     seconds = next((k for k in columns if k.endswith("stamp.sec")), None)
     if seconds is not None:
-        nano = next((k for k in columns if k.endswith(("stamp.nanosec", "stamp.nsec"))), None)
+        nano = _beside(seconds, columns)[1]
         stamp = columns.pop(seconds) + (1e-9 * columns.pop(nano) if nano else 0.0)
     else:
         stamp = np.array(times_s)

@@ -215,12 +215,14 @@ def diagnose(
                     found = Mended(each.run_as, left.gap_before_n, left.effects)
                     result = replace(result, mended=found)
     own: Diagnosis = getattr(result, "reality", result)
+    following = []
     if apply:
         call.then(partial(_applied, own, apply))
-        call.following = [f"next: feel it: palpate touch {apply}"]
+        following.append(f"next: feel it: palpate touch {apply}")
     if corrected:
         call.then(partial(_corrected, own, corrected))
-        call.following = [f"next: reconstruct what is left: palpate reconstruct {corrected} -o MODEL"]
+        following.append(f"next: reconstruct what is left: palpate reconstruct {corrected} -o MODEL")
+    call.following = following or call.following
     call.then_report(result, report)
     return result
 

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from palpate.mechanics.progress import Progress
     from palpate.mechanics.recording.recording import Recording
     from palpate.operations._shared import ModelLike
+    from palpate.scenes.conformance.scaled import ScaledBody
 
 SHAPES = ("kidney", "dome")
 """Bodies of the conformance kit that settings are judged on."""
@@ -124,6 +125,7 @@ def tune(
     from palpate.reconstruction.presses_on_model import presses_on
     from palpate.render.options import RenderOptions
     from palpate.render.registry import simulator_names
+    from palpate.scenes.conformance.scaled import scaled_body
 
     if renderer not in simulator_names():
         raise OptionError(f"--renderer is {renderer!r}; allowed are {', '.join(simulator_names())}")
@@ -160,7 +162,8 @@ def tune(
             notes += told
         law = Runs("fem", RenderOptions())
         law_n = off(law, {}, fitted).gap_n
-        unseen = [_shape(name, made) for name in SHAPES] if shapes else []
+        tip_m, young_pa = made.tool.tip_radius_m, made.material.young_modulus_pa
+        unseen = [path_of_body(scaled_body(name, young_pa, tip_m)) for name in SHAPES] if shapes else []
         result = tuned(
             runs, made, Judged(fitted, held, unseen), noise_n=table.vector_noise_n, law_n=law_n,
             within_s=within_s, at_most=cost, named=named, notes=notes, begun_s=begun,
@@ -237,13 +240,12 @@ def _mended_by(adapter: Any) -> set[str]:
     return {name for tunable in adapter.tunables for name in tunable.mends}
 
 
-def _shape(name: str, made: Model) -> TruePath:
-    """A body of the kit at this modulus and tip."""
+def path_of_body(body: ScaledBody, until_s: float = math.inf) -> TruePath:
+    """The path over a body of the kit, up to a time of it, and its true force."""
     import numpy as np
 
     from palpate.diagnosis.other_simulator.runs import TruePath
-    from palpate.scenes.conformance.scaled import scaled_body
 
-    body = scaled_body(name, made.material.young_modulus_pa, made.tool.tip_radius_m)
-    bound_n = float(np.sqrt((body.bound**2).mean()))
-    return TruePath(name, body.model, body.t, body.centre, body.t, body.force, bound_n, body.friction)
+    rows = slice(0, int(np.searchsorted(body.t, until_s)))
+    t, bound_n = body.t[rows], float(np.sqrt((body.bound[rows] ** 2).mean()))
+    return TruePath(body.name, body.model, t, body.centre[rows], t, body.force[rows], bound_n, body.friction)

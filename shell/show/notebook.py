@@ -40,8 +40,7 @@ def cell(words: str, view: View | None, figure: Figure) -> str:
 def framed_view(view: View, title: str) -> str:
     """HTML of a frame with the view."""
     page = Page(title, bare=True)
-    page.part(view.html("<p>This browser draws no 3D (WebGL).</p>"))
-    page.live = True
+    page.turned(view, "<p>This browser draws no 3D (WebGL).</p>")
     return framed(page.html(), title, VIEW_PX)
 
 

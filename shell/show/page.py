@@ -66,14 +66,13 @@ _MOST_SVG, _MOST_PARTS = 400_000, 3000
 class Page:
     """Collects parts in order; `write` renders them whole.
 
-    folder: where named pictures are written too. bare: without its name and its last line, for a frame. live:
-    whether it holds a view."""
+    folder: where named pictures are written too. bare: without its name and its last line, for a frame."""
 
     def __init__(self, title: str, folder: Path | None = None, *, bare: bool = False) -> None:
         self.title = title
         self._folder, self._bare = folder, bare
         self._parts: list[str] = [] if bare else [f"<h1>{html.escape(title)}</h1>"]
-        self.live = self._inside = False
+        self._live = self._inside = False
         self._chapters: list[str] = []
         self._first: int | None = None
         self._terms = Terms()
@@ -198,12 +197,16 @@ class Page:
     def view(self, view: View, picture: Any, caption: str, model: Model | None = None) -> None:
         """The object to be turned, and of a model a button to press it; without scripts the picture with its
         caption."""
-        self._parts.append(view.html(self._figure(picture, caption)))
-        self.live = True
+        self.turned(view, self._figure(picture, caption))
         if model is not None:
             from palpate.exporting.page.document import button
 
             self._parts.append(button(model))
+
+    def turned(self, view: View, instead: str) -> None:
+        """The object to be turned; instead: HTML for where there are no scripts."""
+        self._parts.append(view.html(instead))
+        self._live = True
 
     def html(self) -> str:
         """The whole page."""
@@ -227,7 +230,7 @@ class Page:
 
     def _scripts(self) -> str:
         own = f"<script>{file_text('page.js')}</script>"
-        if not self.live:
+        if not self._live:
             return own
         from palpate.show.view3d import scripts
 

@@ -281,3 +281,9 @@ def test_whole_seconds_alone_are_no_time(tmp_path):
     log = _written(tmp_path / "log.csv", _logged({"sec": 1732794000 + np.arange(2000) // 200}))
     with pytest.raises(RecordingError, match="whole seconds.*--column t=NAME"):
         pp.import_table(log, tip_radius_m=0.004)
+
+
+def test_one_time_for_all_rows_is_no_clock(tmp_path):
+    log = _written(tmp_path / "log.csv", _logged({"t": np.full(2000, 0.5)}))
+    with pytest.raises(RecordingError, match="one moment.*--column t=NAME"):
+        pp.import_table(log, tip_radius_m=0.004)

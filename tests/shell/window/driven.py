@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
+from palpate.devices.channel import PoseChannel
+from palpate.devices.registry import DeviceChoice
+from palpate.mechanics.model.model import Model
+from palpate.scenes.scene import Scene
 from palpate.window.guide import Guide
+from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.window import TouchWindow
 from palpate.window.worker import Frame
 
@@ -25,6 +32,31 @@ SIDES = [
 ]
 TRACING_M_PER_S = 0.03
 RESTING_S = 0.02
+
+
+@contextmanager
+def driving(
+    model: Model,
+    scene: Scene,
+    options: SessionOptions | None = None,
+    *,
+    guided: Callable[[TouchSession], Guide] | None = None,
+    **window: Any,
+) -> Iterator[Driven]:
+    """A session of a model, begun, with a hand on the mouse of its window. guided: what guides the hand;
+    window: of the window, such as its size."""
+    channel = PoseChannel.create()
+    channel.write(time.perf_counter(), (0.0, 0.0, 0.1))
+    device = DeviceChoice("mouse", {"channel": str(channel.path)})
+    options = options or SessionOptions()
+    with TouchSession(model, title=scene.title, device=device, options=options) as session:
+        session.start()
+        session.enable()
+        guide = None if guided is None else guided(session)
+        shown = TouchWindow(session, scene, channel, off_screen=True, guide=guide, **window)
+        yield Driven(shown)
+        shown.plotter.close()
+    channel.close()
 
 
 class Driven:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import palpate as pp
-from palpate.devices.channel import PoseChannel
-from palpate.devices.registry import DeviceChoice
 from palpate.diagnosis.explore.goals import GoalOptions
 from palpate.diagnosis.explore.segments import Instrument
 from palpate.mechanics.model.model import Model
@@ -19,27 +16,21 @@ from palpate.reconstruction.pipeline import reconstruct
 from palpate.scenes.scene import Scene
 from palpate.window.guide import Guide
 from palpate.window.session import TouchSession
-from palpate.window.window import TouchWindow
 
-from .driven import SIDES, Driven, along_the_foot, as_the_ghost_says
+from .driven import SIDES, along_the_foot, as_the_ghost_says, driving
 
 MOST = 12
 
 
 @pytest.mark.slow
 def test_a_guided_person_knows_the_object_after_a_dozen_presses(block: Model, tmp_path: Path) -> None:
-    channel = PoseChannel.create()
-    channel.write(time.perf_counter(), (0.0, 0.0, 0.1))
-    device = DeviceChoice("mouse", {"channel": str(channel.path)})
-    with TouchSession(block, title="Block", device=device) as session:
-        session.start()
-        session.enable()
+    def guided(session: TouchSession) -> Guide:
         instrument = Instrument(session.servo.tip_radius_m, session.servo.options.rate_hz, {})
         explorer = pp.Explorer(instrument, GoalOptions(modulus_within=0.1, most=MOST))
-        guide = Guide(explorer, session.servo, block, session.worker, tmp_path / "guided.csv.gz")
-        scene = Scene("block", "model", "", title="Block")
-        window = TouchWindow(session, scene, channel, off_screen=True, guide=guide)
-        driven = Driven(window)
+        return Guide(explorer, session.servo, block, session.worker, tmp_path / "guided.csv.gz")
+
+    with driving(block, Scene("block", "model", "", title="Block"), guided=guided) as driven:
+        guide, session = driven.window.guide, driven.session
         for side in (*SIDES, *SIDES):
             if "traced" in guide.lines()[0]:
                 driven.look_from(np.arctan2(side[1], side[0]))
@@ -47,14 +38,12 @@ def test_a_guided_person_knows_the_object_after_a_dozen_presses(block: Model, tm
         driven.until(lambda frame: guide.suggestion.kind == "press" and not session.worker.busy)
         while guide.suggestion.kind == "press":
             as_the_ghost_says(driven, guide)
-        window.plotter.close()
-    channel.close()
     assert guide.suggestion.kind == "stop" and guide.state.made <= MOST
     low, high = guide.state.modulus_ci95_pa
     assert low < block.material.young_modulus_pa < high
     model = reconstruct(read_recording(tmp_path / "guided.csv.gz"))
     assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.1)
-    result = explorer.explored(str(tmp_path / "guided.csv.gz"))
+    result = guide.explorer.explored(str(tmp_path / "guided.csv.gz"))
     page = result.report(tmp_path / "page.html").read_text()
     assert "What to do next: make a model of it" in page and '<section class="view3d"' in page
     # the presses' reasons stand in it, and the last step knows what the state says

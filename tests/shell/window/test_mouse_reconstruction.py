@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from palpate.devices.channel import PoseChannel
-from palpate.devices.registry import DeviceChoice
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import read_recording
 from palpate.reconstruction.pipeline import reconstruct
 from palpate.scenes.scene import Scene
-from palpate.window.session import SessionOptions, TouchSession
-from palpate.window.window import TouchWindow
+from palpate.window.session import SessionOptions
 
-from .driven import HALF, SIDES, Driven, along_the_foot
+from .driven import HALF, SIDES, Driven, along_the_foot, driving
 from .small import SIZE
 
 
@@ -33,18 +29,12 @@ def press(driven: Driven, place: np.ndarray) -> None:
 @pytest.mark.release
 def test_what_a_mouse_touched_is_reconstructed(block: Model, tmp_path: Path) -> None:
     path = tmp_path / "mouse.csv.gz"
-    channel = PoseChannel.create()
-    channel.write(time.perf_counter(), (0.0, 0.0, 0.1))
-    device = DeviceChoice("mouse", {"channel": str(channel.path)})
-    with TouchSession(block, title="Block", device=device, options=SessionOptions(recording=path)) as session:
-        session.start()
-        session.enable()
-        window = TouchWindow(session, Scene("block", "model", "", title="Block"), channel, off_screen=True)
-        driven = Driven(window)
+    scene = Scene("block", "model", "", title="Block")
+    with driving(block, scene, SessionOptions(recording=path)) as driven:
         for side in SIDES:
             driven.look_from(np.arctan2(side[1], side[0]))
             along_the_foot(driven, side)
-        assert session.recording.traced > 0.95
+        assert driven.session.recording.traced > 0.95
         driven.wheel(2, ctrl=True)  # deeper than at the beginning
         for side in SIDES:
             right = np.array([-side[1], side[0], 0.0])
@@ -52,8 +42,6 @@ def test_what_a_mouse_touched_is_reconstructed(block: Model, tmp_path: Path) -> 
             for across in (-0.5, 0.4):
                 press(driven, HALF * side + across * HALF * right + [0, 0, 0.022])
                 press(driven, 0.6 * HALF * side + across * HALF * right + [0, 0, SIZE[2]])
-        window.plotter.close()
-    channel.close()
     recording = read_recording(path)
     assert recording.base_model is None and recording.boundary_phase is not None
     model = reconstruct(recording)

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 import pyvista
 
-from palpate.devices.channel import PoseChannel
-from palpate.devices.registry import DeviceChoice
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.material import Ball
 from palpate.mechanics.model.model import Model
@@ -25,12 +23,12 @@ from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
 from palpate.window.keys import KEYS
 from palpate.window.panel import DEPTH
-from palpate.window.session import SessionOptions, TouchSession
+from palpate.window.session import SessionOptions
 from palpate.window.widgets import BODY
-from palpate.window.window import COLUMN, TouchWindow
+from palpate.window.window import COLUMN
 
 from ...support.waiting import PATIENCE_S, eventually
-from .driven import Driven
+from .driven import Driven, driving
 
 SIZE = (640, 480)
 NODULE, UP = Ball((0.0, 0.0, 0.02), 0.005, 8.0), np.array([0.0, 0.0, 1.0])
@@ -39,19 +37,9 @@ NODULE, UP = Ball((0.0, 0.0, 0.02), 0.005, 8.0), np.array([0.0, 0.0, 1.0])
 @pytest.fixture(scope="module")
 def driven(block: Model, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
     """One session for all tests of this file: they leave it hovering, as it was."""
-    channel = PoseChannel.create()
-    channel.write(0.0, (0.0, 0.0, 0.08))
     scene = Scene("block", "model", str(block.path), title="Block", beside="hunt-crossley")
-    device = DeviceChoice("mouse", {"channel": str(channel.path)})
-    with TouchSession(
-        block, title="Block", device=device, options=SessionOptions(beside=scene.beside)
-    ) as session:
-        session.start()
-        session.enable()
-        window = TouchWindow(session, scene, channel, off_screen=True, size=SIZE)
-        yield Driven(window)
-        window.plotter.close()
-    channel.close()
+    with driving(block, scene, SessionOptions(beside=scene.beside), size=SIZE) as hand:
+        yield hand
 
 
 def sizes(frame) -> list[float]:
