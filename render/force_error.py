@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
-from palpate.mechanics.compliance.sites import principal_curvatures
+from palpate.mechanics.compliance.sites import contact_curvature
 from palpate.mechanics.contact.edges import nearness
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
@@ -92,7 +92,7 @@ def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOpti
     first = compliance.first
     points, normals = compliance.own_points[first], compliance.own_normals[first]
     tip, depth = model.tool.tip_radius_m, COARSE_DEPTH * model.tool.tip_radius_m
-    curvature = principal_curvatures(model.mesh, points, normals, tip).mean(axis=1)
+    curvature = contact_curvature(model.mesh, points, normals, tip)
     law = rendered_touch(model, options).law_of_dent(model.material.poisson_ratio)
     steps = np.linspace(0.0, depth, _STEPS)
     path = (-steps[None, :, None] * normals[:, None]).reshape(-1, 3)

@@ -1,9 +1,10 @@
 """Recompute what the load patch misses beside a sharp rim or above the base, from presses that are solved.
 
 Bodies of unit modulus stand on their base: a tip of 5 mm presses, sticking, into the top of prisms beside a
-rim, or into their flanks above the base and into flat layers (mechanics.press_solver, neo-Hookean). The
-amounts of that part of mechanics.contact.edges that are not zero are fitted to the logarithm of the forces,
-through the touch law; those of the other part stay.
+rim, or into their flanks above the base, into flat layers and into known shapes (mechanics.press_solver,
+neo-Hookean). The amounts of that part of mechanics.contact.edges that are not zero are fitted to the
+logarithm of the forces, through the touch law; those of the other part stay. A bracing of all places alike,
+which whole bodies show beside a half-space, is fitted beside those of the base and left out.
 """
 
 from __future__ import annotations
@@ -16,9 +17,18 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
+from benchmarks._known_shapes import KnownShape
+from benchmarks._more_shapes import EIGHT, thickness
 from benchmarks.felt_surface import meshed
 from palpate.mechanics.compliance.patch import usual_width
-from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from palpate.mechanics.compliance.sites import (
+    LoadPatch,
+    patch_width,
+    principal_curvatures,
+    touch_sites,
+    touch_solver,
+)
+from palpate.mechanics.contact.dent import ellipse_curvature
 from palpate.mechanics.contact.edges import fitted, laid
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.disk.writing import atomic_file
@@ -30,12 +40,18 @@ RADIUS_M, NU = 5e-3, 0.49
 HEIGHT_M, LENGTH_M, WIDTH_M = 0.040, 0.080, 0.080
 DEPTHS_M = 1e-3 * np.array([1.0, 2.0, 3.5, 5.0, 6.5, 8.0, 10.0, 12.0])
 ANGLES = (90.0, 120.0)
-LAYERS_M = (0.010, 0.015, 0.022)
+LAYERS_M = (0.010, 0.015, 0.022, 0.030)
 FROM_RIM_M = 1e-3 * np.array([1.5, 2.5, 3.5, 5.0, 8.0])
 FROM_BASE_M = 1e-3 * np.array([6.5, 8.5, 11.0, 15.0, 21.0])
 RIMS, BASE = "rims", "base"
 UP = np.array([0.0, 0.0, 1.0])
-DEEPEST_OF_LAYER = 0.6
+SHALLOWEST = slice(6)
+"""Of DEPTHS_M, on flanks: a base that holds their foot lets no sphere deeper."""
+KNOWN = ("dome", "kidney", "block", "cylinder", "waist", "bowl", "wedge")
+KNOWN_DEPTHS_M = 1e-3 * np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.5, 8.0])
+LOW_M, CLEAR_M, THIN_M = 0.024, 0.010, 0.012
+"""Half the places of a known shape lie lower; all farther from its rims, with more of it below them."""
+DEEPEST_OF_LAYER = 0.5
 STEPS = 61
 _FAR_OFF = 0.02
 
@@ -89,6 +105,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--layers", type=float, nargs="*", default=list(LAYERS_M), help="for the base: how thick, m"
     )
+    parser.add_argument("--known", nargs="*", choices=KNOWN, default=list(KNOWN), help="for the base: shapes")
+    parser.add_argument("--places", type=int, default=14, help="of each known shape (default: 14)")
     parser.add_argument("--seed", type=int, default=0, help="of where along the edges (default: 0)")
     parser.add_argument("-o", "--output", help="CSV of widths and amounts (palpate.mechanics.contact.edges)")
 
@@ -97,23 +115,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 class Pressed:
     """A place that was pressed. depths: (d,) m. force: (d,) m^2 along the normal, nan where there was no
     equilibrium. far: (3, 3) 1/m, under the patch alone. laid: (g,) 1/m, of mechanics.contact.edges over the
-    patch's width."""
+    patch's width. curvature: 1/m, of the surface (mechanics.contact.dent.ellipse_curvature)."""
 
     normal: np.ndarray
     depths: np.ndarray
     force: np.ndarray
     far: np.ndarray
     laid: np.ndarray
+    curvature: float
 
-    def by_law(self, amounts: np.ndarray, bracing: np.ndarray, curvature: np.ndarray) -> np.ndarray:
-        """(d,) m^2: the touch law's with these amounts (g,)."""
+    def by_law(
+        self, amounts: np.ndarray, bracing: np.ndarray, curvature: np.ndarray, alike: float = 0.0
+    ) -> np.ndarray:
+        """(d,) m^2: the touch law's with these amounts (g,). alike: 1/m, bracing of all places."""
         way = np.unique(np.concatenate([np.linspace(0.0, self.depths[-1], STEPS), self.depths]))
         along = np.outer(self.normal, self.normal)
         place = TouchedPlaces(
             self.normal[None],
             (self.far + self.laid @ amounts * along)[None],
-            self.laid @ curvature,
-            self.laid @ bracing,
+            np.array([self.curvature + self.laid @ curvature]),
+            np.array([alike + self.laid @ bracing]),
         )
         force = touch_forces(
             -way[:, None] * self.normal, np.array([0, len(way)]), place,
@@ -122,19 +143,28 @@ class Pressed:
         return np.interp(self.depths, way, force @ self.normal)
 
 
-def pressed(mesh: TetMesh, points: np.ndarray, normals: np.ndarray, depths: np.ndarray) -> list[Pressed]:
-    """Solve the places (k, 3) of a mesh."""
+def pressed(
+    mesh: TetMesh,
+    points: np.ndarray,
+    normals: np.ndarray,
+    depths: np.ndarray,
+    shape: KnownShape | None = None,
+) -> list[Pressed]:
+    """Solve the places (k, 3) of a mesh, whose surface is plane there but for a known shape's."""
     solver, width = touch_solver(mesh, NU), usual_width(mesh)
     patch = LoadPatch(patch_width(solver.mesh))
     sites = touch_sites(mesh, points, normals, NU, solver=solver, curvature=0.0, patch=patch)
     truth = PressSolver(
-        mesh.linear(), None, young_modulus_pa=1.0, poisson_ratio=NU, tip_radius_m=RADIUS_M,
-        options=PressOptions(coupled=True),
+        mesh.linear(), None if shape is None else (shape.vertices, shape.triangles), young_modulus_pa=1.0,
+        poisson_ratio=NU, tip_radius_m=RADIUS_M, options=PressOptions(coupled=True),
     )  # fmt: skip
+    bent = np.zeros(len(points))
+    if shape is not None:
+        bent = ellipse_curvature(principal_curvatures(mesh, points, normals, RADIUS_M), RADIUS_M)
     near, found = laid(mesh, points, normals) / width, []
     for k, (point, normal) in enumerate(zip(points, normals, strict=True)):
         force = truth.press(point, normal, depths).force @ normal
-        found.append(Pressed(normal, depths, force, sites.far[k], near[k]))
+        found.append(Pressed(normal, depths, force, sites.far[k], near[k], float(bent[k])))
         print(" ".join(f"{value:8.3f}" for value in (*(1e3 * point), *(1e6 * force))), flush=True)
     return found
 
@@ -152,15 +182,25 @@ def fit(found: list[Pressed], part: str) -> tuple[np.ndarray, float, float]:
     known = np.isfinite(np.concatenate([one.force for one in found]))
 
     def left(numbers: np.ndarray) -> np.ndarray:
-        amounts = given.copy()
-        amounts[free] = numbers
-        return np.concatenate([np.log(one.by_law(*amounts) / one.force) for one in found])[known]
+        amounts, alike = given.copy(), (part == BASE) * numbers[-1] / RADIUS_M
+        amounts[free] = numbers[:-1]
+        return np.concatenate([np.log(one.by_law(*amounts, alike) / one.force) for one in found])[known]
 
-    start = np.zeros(free.sum())
+    start = np.zeros(free.sum() + 1)
     solved = least_squares(left, start, x_scale="jac", loss="soft_l1", f_scale=_FAR_OFF)
-    given[free] = solved.x
-    before, after = (float(np.sqrt((left(x) ** 2).mean())) for x in (start, solved.x))
+    given[free] = solved.x[:-1]
+    before, after = (float(np.sqrt((left(x) ** 2).mean())) for x in (start, np.append(solved.x[:-1], 0.0)))
     return given, before, after
+
+
+def known_places(shape: KnownShape, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points and normals (count, 3), half of them low."""
+    points, normals = shape.places(400, 77)
+    clear = (shape.rim_distance(points) > CLEAR_M) & (thickness(shape, points, normals) > THIN_M)
+    points, normals = points[clear], normals[clear]
+    low = points[:, 2] < LOW_M
+    some = np.concatenate([np.flatnonzero(low)[: count // 2], np.flatnonzero(~low)[: count - count // 2]])
+    return points[some], normals[some]
 
 
 def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
@@ -168,11 +208,16 @@ def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
     found: list[Pressed] = []
     for angle in arguments.angles:
         prism = Prism(angle)
-        found += pressed(meshed(prism, 0.01), *prism.places(arguments.part, arguments.seed), DEPTHS_M)
+        depths = DEPTHS_M[SHALLOWEST] if arguments.part == BASE else DEPTHS_M
+        found += pressed(meshed(prism, 0.01), *prism.places(arguments.part, arguments.seed), depths)
     for height in arguments.layers if arguments.part == BASE else ():
         mesh = box_mesh((8, 8, max(1, round(height / 5e-3))), (LENGTH_M, WIDTH_M, height))
         depths = DEPTHS_M[DEPTHS_M < DEEPEST_OF_LAYER * height]
         found += pressed(mesh, np.array([[0.003, 0.004, height]]), UP[None], depths)
+    for name in arguments.known if arguments.part == BASE else ():
+        shape = EIGHT[name]()
+        places = known_places(shape, arguments.places)
+        found += pressed(meshed(shape, 0.01), *places, KNOWN_DEPTHS_M, shape)
     amounts, before, after = fit(found, arguments.part)
     widths, over_base, *_ = fitted()
     print(
@@ -182,7 +227,7 @@ def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
     if arguments.output:
         bodies = f"prisms with rims of {arguments.angles} degrees"
         if arguments.part == BASE:
-            bodies = f"flanks of {bodies}, layers of {arguments.layers} m"
+            bodies = f"flanks of {bodies}, layers of {arguments.layers} m, {', '.join(arguments.known)}"
         command = f"python -m tools.dent_edge --part {arguments.part}"
         header = (
             f"{arguments.part} last fitted: {bodies},\ntip {RADIUS_M} m, nu {NU}, neo-Hookean, sticking "

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.compliance.compression import own_blocks
 from palpate.mechanics.compliance.near_field import contact_width, sharpening
 from palpate.mechanics.compliance.patch import half_space_compliance, usual_width
+from palpate.mechanics.contact.dent import ellipse_curvature
 from palpate.mechanics.contact.depth_factors import DepthFactors
 from palpate.mechanics.contact.edges import edge_law
 from palpate.mechanics.elastic.held_base import BaseHold
@@ -32,7 +33,7 @@ class TouchSites:
     """k touch sites of one object; device frame, SI units, unit modulus.
 
     points, normals: (k, 3), surface points and outward unit normals.
-    curvature: (k,) 1/m, mean of the principal curvatures, positive where the object is convex.
+    curvature: (k,) 1/m, as a contact feels it (contact_curvature), positive where the object is convex.
     far: (k, 3, 3) far-field compliance, 1/m: displacement of the patch a unit force, less that of a
     half-space.
     patch_width_m, poisson_ratio: what they hold for.
@@ -180,7 +181,7 @@ def touch_sites(
         missed = edge_law(mesh, points, normals, poisson_ratio)
         far, bracing, rims = far + missed.far, missed.bracing, missed.curvature
     if curvature is None:
-        curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)
+        curvature = contact_curvature(mesh, points, normals, patch.tip_radius_m)
     bent = np.asarray(curvature, dtype=float) + rims
     return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio), bracing)
 
@@ -200,11 +201,12 @@ def patch_loads(mesh: TetMesh, patches: Sequence[tuple[np.ndarray, np.ndarray]])
     return forces
 
 
-def mean_curvature(
+def contact_curvature(
     mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
 ) -> np.ndarray:
-    """(k,) 1/m mean of the principal curvatures at surface points, convex positive."""
-    return principal_curvatures(mesh, points, normals, tip_radius_m).mean(axis=1)
+    """(k,) 1/m at surface points, convex positive, as a tip of that radius feels both principal ones
+    (mechanics.contact.dent.ellipse_curvature)."""
+    return ellipse_curvature(principal_curvatures(mesh, points, normals, tip_radius_m), tip_radius_m)
 
 
 def principal_curvatures(

@@ -8,7 +8,7 @@ from palpate.mechanics.compliance.coarse_table import CoarseCompliance
 from palpate.mechanics.compliance.near_field import surface_softness
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.patch import half_space_compliance
-from palpate.mechanics.compliance.sites import principal_curvatures
+from palpate.mechanics.compliance.sites import contact_curvature
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.contact.edges import edge_law
 from palpate.mechanics.disk.store import content_key, load_or_build
@@ -23,7 +23,7 @@ Compliance = SurfaceCompliance | OnDemandCompliance | CoarseCompliance
 
 class FineSurface:
     """far: (v, 3, 3) 1/m, unit modulus, NaN where it is not solved yet, zero on the base. curvature: (v,) 1/m
-    mean of the principal ones, convex positive, and what a rim close by adds (mechanics.contact.edges); only
+    of contact_curvature, convex positive, and what a rim close by adds (mechanics.contact.edges); only
     where far is known.
 
     bracing: (v,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges).
@@ -94,15 +94,15 @@ def keep_surface(model: Model, options: RenderOptions) -> None:
 
 
 def kept_curvature(model: Model, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(k,) 1/m, mean of the principal curvatures of a known shape at all of a surface's places (k, 3), from
+    """(k,) 1/m, curvature (contact_curvature) of a known shape at all of a surface's places (k, 3), from
     the model's folder where it is kept."""
     shape = model.mesh.shape
     if model.path is None or shape is None:
         return _curvature(model, points, normals)
-    key = content_key("curvature 1", shape.key, points, normals, float(model.tool.tip_radius_m))
+    key = content_key("curvature 2", shape.key, points, normals, float(model.tool.tip_radius_m))
     path = model.path / f"curvature-{key[:16]}.bin"
-    return load_or_build(path, key, lambda: {"mean": _curvature(model, points, normals)})["mean"]
+    return load_or_build(path, key, lambda: {"felt": _curvature(model, points, normals)})["felt"]
 
 
 def _curvature(model: Model, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    return principal_curvatures(model.mesh, points, normals, model.tool.tip_radius_m).mean(axis=1)
+    return contact_curvature(model.mesh, points, normals, model.tool.tip_radius_m)

@@ -18,7 +18,7 @@ class FemParameters(NamedTuple):
     """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
 
     far: (v, 3, 3) 1/m, NaN where it is not solved; far_before, series_before: what a state that goes on from
-    the edition before leaves gradually (render.fem.kernel). curvature: (v,) 1/m, mean of the principal ones.
+    the edition before leaves gradually (render.fem.kernel). curvature: (v,) 1/m (contact_curvature).
     bracing: (v,) 1/m (Field). softness: (v,) of the material under a tip, 1 where its modulus is the global
     one. parents: (k, 3) compliance nodes that interpolate over a triangle, -1 where fixed; parent_weights (k,
     3, 3). blocks: (n, n, 3, 3) 1/m, or of no size and factor: (n, 3, r) in their place, see

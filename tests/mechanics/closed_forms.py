@@ -7,6 +7,8 @@ where they are called normal. SI units. Sources: Johnson, Contact Mechanics (198
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
 
 
 def plane_strain_modulus(young_modulus_pa: float, poisson_ratio: float) -> float:
@@ -20,6 +22,23 @@ def hertz_force(
     """Force, N, of a rigid paraboloid pressed `depth_m` into a half-space: 4/3 E* sqrt(R) d^1.5 (4.23)."""
     depth = np.maximum(depth_m, 0.0)
     return 4 / 3 * plane_strain_modulus(young_modulus_pa, poisson_ratio) * np.sqrt(radius_m) * depth**1.5
+
+
+def elliptic_force(
+    depth_m: np.ndarray, greater: float, less: float, young_modulus_pa: float, poisson_ratio: float
+) -> np.ndarray:
+    """Force, N, of a rigid body of principal relative curvatures `greater` > `less`, 1/m (4.25 to 4.31)."""
+
+    def integrals(axes: float) -> tuple[float, float]:
+        k, e = ellipk(1 - axes**2), ellipe(1 - axes**2)
+        return e / axes**2 - k, k - e
+
+    axes = brentq(lambda b: np.divide(*integrals(b)) - greater / less, 1e-3, 1 - 1e-6)
+    sides = np.prod(integrals(axes))
+    first = (4 / np.pi / (1 - axes**2)) ** (1 / 3) * np.sqrt(axes) * sides ** (1 / 6)
+    second = 2 / np.pi * np.sqrt(axes) / first * ellipk(1 - axes**2)
+    round_one = hertz_force(depth_m, 1 / np.sqrt(greater * less), young_modulus_pa, poisson_ratio)
+    return round_one / second**1.5
 
 
 def hertz_contact_radius(depth_m: np.ndarray, radius_m: float) -> np.ndarray:

@@ -5,11 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.mechanics.contact.dent import dent_force, dent_law, dent_laws, effective_radius, grid
+from palpate.mechanics.contact.dent import (
+    dent_force,
+    dent_law,
+    dent_laws,
+    effective_radius,
+    ellipse_curvature,
+    grid,
+)
 from palpate.mechanics.errors import OptionError
 
 from .closed_forms import (
     bonded_punch_sideways_force,
+    elliptic_force,
     flat_punch_force,
     hertz_force,
     plane_strain_modulus,
@@ -129,3 +137,13 @@ def test_without_friction_and_strain_the_dent_is_sneddons():
     for nu in (0.40, NU):
         free = dent_law("linear", nu, 0.0).force(depth, E, nu, R)
         assert free == pytest.approx(dent_law("sphere").force(depth, E, nu, R), rel=2e-3)
+
+
+@pytest.mark.parametrize("ratio", [1.001, 1.5, 3.0, 8.0])
+def test_an_elliptic_contact_is_hertzs(ratio):
+    low = 1 / R - 40.0
+    principal = np.array([[ratio * low - 1 / R, low - 1 / R]])
+    round_one = effective_radius(R, ellipse_curvature(principal, R))
+    depth = np.array([1e-5])
+    exact = elliptic_force(depth, ratio * low, low, E, NU)
+    assert hertz_force(depth, round_one, E, NU) == pytest.approx(exact, rel=2e-3)

@@ -70,17 +70,15 @@ def test_a_contact_that_a_rim_cuts_off_is_softer_from_the_first_touch_on(block):
 
 def test_the_base_holds_what_lies_close_above_it(block):
     law = edge_law(block, *wall(0.006, 0.009, 0.022))
-    near, higher, far = law.far[:, 0, 0]
-    assert near < higher < 0
-    assert far == 0
     near, higher, far = 0.005 * law.bracing
-    assert near > 0.35 > higher > 0.2 > 0.12 > far > 0.03
+    assert near > 0.35 > higher > 0.1 > far > 0
+    below = edge_law(block, np.array([[0.0, 0.0, 0.009]]), UP[None])
+    assert 0.005 * below.bracing[0] > 2 * higher
 
 
 def test_a_base_braces_less_what_gives_way_in_volume(block):
-    usual, softer, softest = (edge_law(block, *wall(0.009), nu).bracing[0] for nu in (0.49, 0.42, 0.3))
-    assert usual > 1.5 * softer > 0
-    assert softest == 0
+    usual, softer, softest = (edge_law(block, *wall(0.009), nu).bracing[0] for nu in (0.49, 0.4, 0.3))
+    assert usual > 1.2 * softer > 1.2 * softest > 0.3 * usual
 
 
 def test_a_base_close_below_makes_a_dent_harder_the_deeper_it_is(block):

@@ -9,7 +9,7 @@ import pytest
 
 from palpate.mechanics.compliance.sites import (
     LoadPatch,
-    mean_curvature,
+    contact_curvature,
     patch_width,
     touch_sites,
     touch_solver,
@@ -157,5 +157,5 @@ def test_curvature_of_a_bent_surface(box):
     points = mesh.points.copy()
     points[:, 2] *= 1 - (points[:, 0] ** 2 / 0.1 + points[:, 1] ** 2 / 0.3) / (2 * 0.03)
     bent = type(mesh)(points, mesh.tetrahedra, mesh.fixed, mesh.touchable)
-    found = mean_curvature(bent, np.array([[0.0, 0.0, 0.03]]), UP[None])[0]
+    found = contact_curvature(bent, np.array([[0.0, 0.0, 0.03]]), UP[None])[0]
     assert found == pytest.approx(0.5 * (1 / 0.1 + 1 / 0.3), rel=0.05)
