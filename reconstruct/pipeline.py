@@ -21,6 +21,7 @@ from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import Result
 from palpate.reconstruction.checks.finding import Finding, outcome_of
+from palpate.reconstruction.checks.flat import flat
 from palpate.reconstruction.checks.registry import (
     checked_presses,
     checked_results,
@@ -201,7 +202,9 @@ def measure(recording: Recording, geometry: GeometryOptions, method: Method) -> 
         measured = within_slab(pressed, geometry.slab_m)
     else:
         measured = over_its_base(recording, found)
-    return dataclasses.replace(measured, findings=samples.found)
+    measured = dataclasses.replace(measured, findings=samples.found)
+    # what the first touches tell is said before minutes are spent on it
+    return with_findings(measured, flat(measured, geometry), options.force)
 
 
 @dataclass(frozen=True)

@@ -23,16 +23,24 @@ from palpate.reconstruction.checks.finding import (
     Way,
     outcome,
 )
+from palpate.reconstruction.checks.flat import flat
 from palpate.reconstruction.checks.handedness import handedness
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
 from palpate.reconstruction.checks.units import measured, settled
-from palpate.reconstruction.geometry.stated import GeometryOptions, over_its_base, stated_geometry
+from palpate.reconstruction.geometry.stated import (
+    GeometryOptions,
+    nowhere,
+    over_its_base,
+    stated_geometry,
+)
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
+from palpate.reconstruction.steps.s3_contacts.left_out import within_slab, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import is_points
+from palpate.reconstruction.steps.s3_contacts.sliding_presses import FLAT
 
 OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Measured], Iterator[Finding]], ...] = (support, dropped)
@@ -94,12 +102,26 @@ def looked_at(
     recording: Recording, geometry: GeometryOptions | None = None
 ) -> tuple[tuple[Finding, ...], Seen]:
     """As `check`, and what the checks measure on the way. geometry: said beside the recording's own."""
-    known = stated_geometry(recording, geometry or GeometryOptions()).known
-    samples = checked_samples(recording, by_hand=not known)
+    said = stated_geometry(recording, geometry or GeometryOptions())
+    samples = checked_samples(recording, by_hand=not said.known)
     found = samples.found
-    if not (known or any(f.grave for f in found)):
-        found = _with_presses(recording, samples)
+    if not any(f.grave for f in found):
+        found = _on_known(recording, samples, said) if said.known else _with_presses(recording, samples)
     return found, seen(samples.data)
+
+
+def _on_known(
+    recording: Recording, samples: CheckedSamples, geometry: GeometryOptions
+) -> tuple[Finding, ...]:
+    """With what touches say of a geometry that is stated; where they cannot be found, reconstruction says."""
+    if geometry.kind not in FLAT:
+        return samples.found
+    try:
+        measured = explore(recording, boundary=nowhere(recording), spans=samples.spans, unbroken=True)
+        measured = within_slab(without_slides(measured, 1), geometry.slab_m)
+    except ContactError:
+        return samples.found
+    return ordered([*samples.found, *flat(measured, geometry)])
 
 
 def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[Finding, ...]:
