@@ -161,15 +161,12 @@ def where(result: Diagnosis) -> tuple[str, str, str]:
         rms = float(press_gaps(result)[worst_press(result)])
     largest = place_mm(there_m)
     question = "Where does it show?"
-    if result.kind == "none":
-        text = (
-            "No place, depth or speed stands out beyond what noise, first touch and shape may do. The "
-            f"largest difference is {force_words(rms)}, at {largest} (the press shown)."
-        )
-        return question, "Nowhere in particular", text
     # the gap of held-out places may exceed what a fit leaves at the worst place: the smaller one is not said
     size = f": {force_words(rms)}" if rms > result.gap_before_n else ""
     there = f"It is largest at {largest} (the press shown){size}."
+    if result.kind == "none":
+        none = "No place, depth or speed stands out beyond what noise, first touch and shape may do."
+        return question, "Nowhere in particular", f"{none} {there}"
     if axis.share < LITTLE:
         most = f"It depends most on {AXIS_WORDS[axis.axis]}, which explains {percent(axis.share)} of it."
         return question, "Everywhere alike", f"{most} {there}"

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from palpate.show import story as say
+from palpate.show.diagnosis.words import where
 from palpate.show.page import Page
 from palpate.words import (
     MOST_WORDS,
@@ -159,3 +161,13 @@ def test_a_chapter_is_folded_its_parts_are_headings_in_it_and_one_without_words_
     assert re.findall(r'href="#(chapter-\d)">([^<]*)<', said) == [
         ("chapter-1", "What for?"), ("chapter-2", "At once?")
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["none", "effect"])
+def test_the_largest_difference_is_never_said_smaller_than_a_typical_one(kind):
+    """At held-out places it may be: "typically 23 mN off … the largest difference is 21 mN" stood there."""
+    axis = SimpleNamespace(axis="space", share=0.4, p=0.01)
+    of_places = SimpleNamespace(leading=axis, worst=((0.01, 0.0, 0.05, 0.021),))
+    for typical_n, is_said in ((0.023, False), (0.012, True)):
+        result = SimpleNamespace(where=of_places, forward=None, kind=kind, gap_before_n=typical_n)
+        assert ("21 mN" in where(result)[2]) == is_said

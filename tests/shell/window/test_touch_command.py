@@ -69,6 +69,7 @@ def test_a_model_that_is_in_no_folder_is_to_be_saved_before_a_window_or_a_device
         (["--headless", "--device", "glove"], "mouse, spacemouse"),
         (["--headless", "--renderer", "magic"], "allowed are fem"),
         (["--headless", "--seconds", "-1"], "greater than 0"),
+        (["--headless", "--screenshot", "seen.png"], "--screenshot"),
         (["--headless", "--device", "replay"], "--replay REC"),
         (["--headless", "--device", "spacemouse"], "plug"),
     ],
