@@ -9,9 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.show import story as say
+from palpate.show.comparison.figures import press_curves
 from palpate.show.diagnosis.words import where
-from palpate.show.page import Page
+from palpate.show.page import Page, new_figure
 from palpate.words import (
     MOST_WORDS,
     ended,
@@ -25,6 +27,8 @@ from palpate.words import (
     spoken,
     sure_kpa,
 )
+
+from ...reconstruct.exploration_of_cylinder import explore_cylinder
 
 
 def printed(*blocks: say.Told) -> str:
@@ -171,3 +175,14 @@ def test_the_largest_difference_is_never_said_smaller_than_a_typical_one(kind):
     for typical_n, is_said in ((0.023, False), (0.012, True)):
         result = SimpleNamespace(where=of_places, forward=None, kind=kind, gap_before_n=typical_n)
         assert ("21 mN" in where(result)[2]) == is_said
+
+
+def test_a_press_of_the_comparison_shows_what_is_off_sideways():
+    """The error is of the whole force; the curve beside it showed only what goes into the surface."""
+    presses = explore(explore_cylinder()[0]).presses
+    aside = 0.3 * presses.frame[presses.press][:, 1]
+    predicted = {name: presses.force + aside for name in ("fem", "kelvin-voigt", "hunt-crossley")}
+    ax = new_figure(4, 3).subplots()
+    press_curves(ax, SimpleNamespace(presses=presses, predicted=predicted), 0)
+    measured, fem = (line.get_ydata() for line in ax.lines[1:4:2])
+    assert np.abs(fem - measured).max() > 0.1
