@@ -62,6 +62,9 @@ def verdict(result: Diagnosis) -> str:
         )
     if not left_out:
         said = f"Nothing new is missing: what these touches show is {there}, which the model already has"
+    elif result.kind == "ambiguous" and rivals and not _likelier_than_not(result):
+        what = spoken([*missing(result), *result.candidates], "or")
+        return f"The simulation leaves something out, and these touches cannot tell what: {what}."
     elif result.kind == "ambiguous":
         said = f"The simulation leaves something out: most likely {left_out}"
     else:
@@ -73,6 +76,12 @@ def verdict(result: Diagnosis) -> str:
     if "unknown" in result.kind:
         return f"{said}. Something else is missing that this program does not know."
     return f"{said}."
+
+
+def _likelier_than_not(result: Diagnosis) -> bool:
+    """Whether each effect that is named and missing is there by more than half of the odds."""
+    named = missing(result)
+    return all(e.probability > 0.5 for e in result.entries if e.name in named)
 
 
 def consequence(result: Diagnosis, force_rms_n: float) -> str:

@@ -12,7 +12,7 @@ import pytest
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.show import story as say
 from palpate.show.comparison.figures import press_curves
-from palpate.show.diagnosis.words import where
+from palpate.show.diagnosis.words import verdict, where
 from palpate.show.page import Page, new_figure
 from palpate.words import (
     MOST_WORDS,
@@ -186,3 +186,22 @@ def test_a_press_of_the_comparison_shows_what_is_off_sideways():
     press_curves(ax, SimpleNamespace(presses=presses, predicted=predicted), 0)
     measured, fem = (line.get_ydata() for line in ax.lines[1:4:2])
     assert np.abs(fem - measured).max() > 0.1
+
+
+@pytest.mark.parametrize(("share", "called_likely"), [(0.33, False), (0.8, True)])
+def test_what_has_a_third_of_the_odds_is_not_called_most_likely(share, called_likely):
+    """ "Most likely a compliant base" was the headline of 33 %."""
+    entries = [
+        SimpleNamespace(name=n, probability=p) for n, p in (("compliant_base", share), ("inclusion", 0.2))
+    ]
+    said = verdict(
+        SimpleNamespace(
+            kind="ambiguous",
+            effects=("compliant_base",),
+            candidates=("inclusion",),
+            entries=entries,
+            model=None,
+        )
+    )
+    assert ("most likely" in said) == called_likely
+    assert "compliant base" in said and "inclusion" in said
