@@ -264,6 +264,10 @@ def test_stiffness_is_coloured_at_the_depth_that_one_presses_to(tab):
     shallow, deep = painted(0.001), painted(0.008)
     assert len(shallow) == len(deep) and np.abs(np.subtract(shallow, deep)).max() > 0.02
     assert "8.0 mm" in tab.evaluate("document.getElementById('scale').textContent")
+    # most of the object lies within the colours, however stiff its rim
+    assert 0.2 < np.percentile(deep, 75) - np.percentile(deep, 25)
+    (_, scale, _, tall), (_, hint, _, _) = box(tab, "scale"), box(tab, "hint")
+    assert scale + tall <= hint, "one lies over the other"
 
 
 @needs_browser
