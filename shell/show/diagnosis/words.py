@@ -39,6 +39,8 @@ def meaning(name: str) -> str:
 
 MOST_SETS = 4
 """Of causes that words tell; the JSON holds all."""
+FIRST_LIMITS = 3
+"""Limits that the first screen of a page tells; the table of what was tried has each."""
 LITTLE = 0.1
 """A share of the difference below which it is not said to depend on something."""
 
@@ -125,7 +127,7 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
     if result.kind == "none":
         smaller = "Smaller ones may be there; deeper, faster or longer touches would show them."
         weighed = f"These touches leave open: {left}. " if result.candidates else ""
-        text = f"{weighed}{begun(limits(result))}. {smaller}"
+        text = f"{weighed}{begun(limits(result, FIRST_LIMITS))}. {smaller}"
         return question, "Larger effects would have been named", text
     if result.candidates:
         also = "; ".join(f"{spaced(n)}: {meaning(n)}" for n in result.candidates)
@@ -151,12 +153,17 @@ def _set(names: Sequence[str]) -> str:
     return " and ".join(map(spaced, names)) or "nothing that is missing"
 
 
-def limits(result: Diagnosis) -> str:
-    """From which size on each effect would have been named, the smallest first, and what never would."""
+def limits(result: Diagnosis, most: int | None = None) -> str:
+    """From which size on each effect would have been named, the smallest first, and what never would; most:
+    so many of the smallest, and the largest."""
     known = {e.name: e.detectable_n for e in result.entries if not np.isnan(e.detectable_n)}
     never = [name for name, limit in known.items() if np.isinf(limit)]
     ranked = sorted((n for n in known if n not in never), key=lambda n: known[n])
-    from_size = listed(f"{spaced(n)} from {force_words(known[n])}" for n in ranked)
+    shown = ranked if most is None or len(ranked) <= most + 1 else [*ranked[:most], ranked[-1]]
+    each = [f"{spaced(n)} from {force_words(known[n])}" for n in shown]
+    if len(shown) < len(ranked):
+        each.insert(most or 0, f"{len(ranked) - len(shown)} others (What was tried?)")
+    from_size = listed(each)
     said = [f"named in 19 of 20 such recordings would be {from_size}"] if ranked else []
     said += [f"at no size {spoken(never)}"] if never else []
     return "; ".join(said)

@@ -12,7 +12,7 @@ import pytest
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.show import story as say
 from palpate.show.comparison.figures import press_curves
-from palpate.show.diagnosis.words import verdict, where
+from palpate.show.diagnosis.words import limits, verdict, where
 from palpate.show.page import Page, new_figure
 from palpate.words import (
     MOST_WORDS,
@@ -205,3 +205,13 @@ def test_what_has_a_third_of_the_odds_is_not_called_most_likely(share, called_li
     )
     assert ("most likely" in said) == called_likely
     assert "compliant base" in said and "inclusion" in said
+
+
+def test_a_first_screen_tells_few_limits_and_a_terminal_all():
+    """Nineteen stood on it, in a card as high as a laptop's screen."""
+    entries = [SimpleNamespace(name=f"effect_{k}", detectable_n=1e-3 * (k + 1)) for k in range(19)]
+    result = SimpleNamespace(entries=entries)
+    assert limits(result).count(" from ") == 19
+    few = limits(result, 3)
+    assert few.count(" from ") == 4 and "15 others" in few and "effect 18 from 19 mN" in few
+    assert limits(SimpleNamespace(entries=entries[:4]), 3).count(" from ") == 4
