@@ -137,10 +137,10 @@ class FiniteTip:
         solver = touch_solver(body.mesh, nu)
         clock.lap("factorise")
         sites = touch_sites(
-            mesh, body.cast.points, body.cast.normals, nu, solver=solver, progress=part(progress, 0.5, 0.8)
+            mesh, body.cast.points, body.cast.normals, nu, solver=solver, progress=part(progress, 0.5, 0.6)
         )
         clock.lap("touch sites")
-        progress("modulus", 0.8)
+        progress("modulus", 0.6)
         local = body.surface if placed is None else placed.by_itself
         covariance = compliance_covariance(
             solver, sites, uncertainty_at(solver.mesh, local), pose=None if placed is None else placed.pose
@@ -156,7 +156,7 @@ class FiniteTip:
         fit, solved = fitted(), None
         if self.options.modulus.exact:
             clock.lap("modulus")
-            solved = FittedSolution(_solve(body, mesh, sites, fit, part(progress, 0.8, 0.95), say), fit)
+            solved = FittedSolution(_solve(body, mesh, sites, fit, part(progress, 0.6, 0.8), say), fit)
             clock.lap("solved places")
             fit = fitted(solved.presses.factors)
             sites = dataclasses.replace(sites, factors=solved.presses.factors[fit.press.law])

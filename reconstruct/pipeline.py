@@ -21,6 +21,7 @@ from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import Result
 from palpate.reconstruction.checks.finding import Finding, outcome_of
+from palpate.reconstruction.checks.flat import flat
 from palpate.reconstruction.checks.registry import (
     checked_presses,
     checked_results,
@@ -160,7 +161,7 @@ def reconstruct_fully(
             clock.lap("surface")
         progress("meshing", 0.3)
         body = _meshed(shaped, geometry.kind, poisson_ratio, method, mesher, clock)
-        progress("factorise", 0.5)
+        progress("factorise", 0.35)
         fitted = method.fit(body, progress, clock, say)
         return _concluded(body, fitted, options, mesher, progress, clock)
 
@@ -201,7 +202,9 @@ def measure(recording: Recording, geometry: GeometryOptions, method: Method) -> 
         measured = within_slab(pressed, geometry.slab_m)
     else:
         measured = over_its_base(recording, found)
-    return dataclasses.replace(measured, findings=samples.found)
+    measured = dataclasses.replace(measured, findings=samples.found)
+    # what the first touches tell is said before minutes are spent on it
+    return with_findings(measured, flat(measured, geometry), options.force)
 
 
 @dataclass(frozen=True)
@@ -280,7 +283,7 @@ def _concluded(
     measured = with_findings(measured, checked_results(outcome), options.force)
     interval = widened(fitted.modulus_pa, fitted.ci95_pa, measured.findings)
     clock.lap("modulus")
-    progress("model", 0.95)
+    progress("model", 0.8)
     meshing = mesher.judged()
     tip_radius_m = measured.recording.tip_radius_m
     model = Model(
@@ -294,7 +297,7 @@ def _concluded(
         provenance=_provenance(measured, options, surface, fitted.modulus),
         about=_tables(surface, body.placed, fitted.sites, tip_radius_m),
     )
-    model, predicted = _judged(model, fitted, options.modulus_field.field, measured.noise_n, clock)
+    model, predicted = _judged(model, fitted, options.modulus_field.field, measured.noise_n, clock, progress)
     progress("done", 1.0)
     return Reconstruction(
         model=model,
@@ -315,7 +318,7 @@ def _concluded(
 
 
 def _judged(
-    model: Model, fitted: ModulusOnMesh, field: str, noise_n: float, clock: Clock
+    model: Model, fitted: ModulusOnMesh, field: str, noise_n: float, clock: Clock, progress: Progress
 ) -> tuple[Model, HeldOutErrors | None]:
     """The model, with a field where that is wanted and its presses ask for one, and how it predicts places
     that were held out."""
@@ -326,6 +329,7 @@ def _judged(
     predicted = held_out(presses, sites, modulus, by_others)
     clock.lap("held-out places")
     if field == "auto" or (field == "where-beaten" and predicted is not None and predicted.beaten_by):
+        progress("modulus from place to place", 0.82)
         model, of_field = with_fitted_field(model, sites, noise_n)
         clock.lap("modulus field")
         if of_field is not None:

@@ -24,7 +24,7 @@ from palpate.render.effects import rendered_touch
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.options import RenderOptions
 from palpate.render.surface.felt_surface import felt_surface
-from palpate.render.surface.snapping import ONSET_NOISE_M
+from palpate.render.surface.snapping import ONSET_NOISE_M, is_given
 
 SURE = 1.96
 COARSE_DEPTH, _STEPS = 0.6, 7
@@ -62,7 +62,8 @@ def force_errors(
     shares = rendered_share(renderer, depth / tip_radius_m, numbers)
     uncertain = felt_surface(renderer.model).uncertainty_m
     sd = uncertain[near] if len(uncertain) == len(surface.vertices) else np.zeros(len(size))
-    onset = ONSET_NOISE_M if len(renderer.model.presses) else 0.0
+    measured = len(renderer.model.presses) and not is_given(renderer.model)
+    onset = ONSET_NOISE_M if measured else 0.0
     return ForceErrors(shares * size, SURE * sd * steepness, SURE * onset * steepness)
 
 

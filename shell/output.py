@@ -79,13 +79,15 @@ class Bar:
     def __init__(self, label: str) -> None:
         from tqdm import tqdm
 
-        terminal = sys.stderr.isatty()
+        terminal, (columns, rows) = sys.stderr.isatty(), shutil.get_terminal_size()
         self._bar = tqdm(
             total=100.0,
             desc=label,
             file=sys.stderr,
             disable=not terminal,
             bar_format="{percentage:3.0f}% {bar:16} {elapsed} {desc}",
+            ncols=columns,
+            nrows=rows,  # tqdm draws nothing on a terminal that says no size
             leave=True,
         )
         self._terminal, self._label, self._stage, self._share = terminal, label, "", 0.0
@@ -108,7 +110,8 @@ class Bar:
         return ", ".join(word for word in (about, self._left.words() if late else "") if word)
 
     def _draw(self) -> None:
-        width = max(20, shutil.get_terminal_size().columns - 30)
+        self._bar.ncols = shutil.get_terminal_size().columns
+        width = max(20, self._bar.ncols - 30)
         self._bar.set_description_str(self._words()[:width], refresh=False)
         self._bar.n = 100.0 * self._share
         self._bar.refresh()

@@ -94,8 +94,13 @@ class Explorer:
         instrument, segments = split(recording)
         nu = {} if recording.poisson_ratio is None else {"poisson_ratio": recording.poisson_ratio}
         made = cls(instrument, goals, reach, **{**nu, **given})
-        made.segments = segments
-        made.bring_up_to_date()
+        # the last touches test the surface as it was before them, as they did when they were made
+        presses = [k for k, s in enumerate(segments) if s.kind == "press"]
+        tested = presses[max(LEAST_PRESSES, len(presses) - RECENT) :]
+        for end in (*tested, len(segments)):
+            made.segments = segments[:end]
+            made.bring_up_to_date()
+        del made._steps[:-1]
         return made
 
     @property

@@ -27,6 +27,10 @@ GRAVE = 0.25
 """A finding that may move the modulus by this share, or makes it meaningless, is grave."""
 
 
+PRESSES = "presses that can be used"
+"""Words of what is seen."""
+
+
 @dataclass(frozen=True)
 class Way:
     """A way to go on with the same file. says: where it is right. options: of `palpate open`, by name; a
@@ -124,6 +128,11 @@ class Checkup(Result):
     seen: tuple[tuple[str, float, float], ...] = ()
     full: bool = False
     opened: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def presses(self) -> int | None:
+        """How many presses reconstruction would find; None where something grave stands before them."""
+        return next((int(value) for words, value, _ in self.seen if words == PRESSES), None)
 
     @property
     def grave(self) -> tuple[Finding, ...]:

@@ -18,21 +18,30 @@ from palpate.reconstruction.checks.channels import channels
 from palpate.reconstruction.checks.clock import clock
 from palpate.reconstruction.checks.finding import (
     OF_A_KNOWN_OBJECT,
+    PRESSES,
     Finding,
     ReconstructionOutcome,
     Way,
     outcome,
 )
+from palpate.reconstruction.checks.flat import flat
 from palpate.reconstruction.checks.handedness import handedness
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
 from palpate.reconstruction.checks.units import measured, settled
-from palpate.reconstruction.geometry.stated import GeometryOptions, over_its_base, stated_geometry
+from palpate.reconstruction.geometry.stated import (
+    GeometryOptions,
+    nowhere,
+    over_its_base,
+    stated_geometry,
+)
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
+from palpate.reconstruction.steps.s3_contacts.left_out import within_slab, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import is_points
+from palpate.reconstruction.steps.s3_contacts.sliding_presses import FLAT
 
 OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Measured], Iterator[Finding]], ...] = (support, dropped)
@@ -94,25 +103,43 @@ def looked_at(
     recording: Recording, geometry: GeometryOptions | None = None
 ) -> tuple[tuple[Finding, ...], Seen]:
     """As `check`, and what the checks measure on the way. geometry: said beside the recording's own."""
-    known = stated_geometry(recording, geometry or GeometryOptions()).known
-    samples = checked_samples(recording, by_hand=not known)
-    found = samples.found
-    if not (known or any(f.grave for f in found)):
-        found = _with_presses(recording, samples)
-    return found, seen(samples.data)
+    said = stated_geometry(recording, geometry or GeometryOptions())
+    samples = checked_samples(recording, by_hand=not said.known)
+    found, presses = samples.found, None
+    if not any(f.grave for f in found):
+        looked = _on_known(recording, samples, said) if said.known else _with_presses(recording, samples)
+        found, presses = looked
+    counted: Seen = () if presses is None else ((PRESSES, float(presses), np.nan),)
+    return found, (*seen(samples.data), *counted)
 
 
-def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[Finding, ...]:
+def _on_known(
+    recording: Recording, samples: CheckedSamples, geometry: GeometryOptions
+) -> tuple[tuple[Finding, ...], int | None]:
+    """With what touches say of a geometry that is stated, and how many they are; where they cannot be found,
+    reconstruction says why."""
+    if geometry.kind not in FLAT:
+        return samples.found, None
+    try:
+        measured = explore(recording, boundary=nowhere(recording), spans=samples.spans, unbroken=True)
+        measured = within_slab(without_slides(measured, 1), geometry.slab_m)
+    except ContactError:
+        return samples.found, None
+    return ordered([*samples.found, *flat(measured, geometry)]), len(measured.presses)
+
+
+def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[tuple[Finding, ...], int | None]:
+    """With what base and presses show, and how many presses there are."""
     found = samples.found
     try:
         exploration = over_its_base(
             recording, lambda base: explore(recording, boundary=base, spans=samples.spans)
         )
     except NoBaseError as error:
-        return ordered([*found, _refused(recording, "no base", error, OF_A_KNOWN_OBJECT)])
+        return ordered([*found, _refused(recording, "no base", error, OF_A_KNOWN_OBJECT)]), None
     except ContactError as error:
-        return ordered([*found, _refused(recording, "no presses", error, _with_few(error))])
-    return ordered([*found, *checked_presses(exploration)])
+        return ordered([*found, _refused(recording, "no presses", error, _with_few(error))]), None
+    return ordered([*found, *checked_presses(exploration)]), len(exploration.presses)
 
 
 Seen = tuple[tuple[str, float, float], ...]

@@ -10,7 +10,7 @@ from palpate.mechanics.frames import support_axes
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.mechanics.statistics import biweight
-from palpate.reconstruction.geometry.registration import DIRECTION_RAD, off_surface
+from palpate.reconstruction.geometry.registration import DIRECTION_RAD, OffSurface, off_surface
 from palpate.reconstruction.geometry.stated import GeometryOptions, Placed, base_of_rim, foot_rim
 from palpate.reconstruction.steps.s4_surface import Surface
 
@@ -28,13 +28,9 @@ contact's own compliance."""
 def place_slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -> Placed:
     """A slab whose top goes through the first touches; a half-space is a slab far deeper than any contact."""
     radius = presses.tip_radius_m
-    if options.pose == "given":
-        up, top, covariance = np.array([0.0, 0.0, 1.0]), np.zeros(3), np.zeros((3, 3))
-        residual = presses.centre[:, 2] - radius
-    else:
-        up, top, covariance, residual = _plane(presses)
+    up, top, covariance, residual = _top(presses, options)
     contact = float(np.sqrt(radius * max(presses.depth_m.max(), 0.1 * radius)))
-    spread = float(np.ptp(presses.point @ support_axes(up)[:2].T, axis=0).max())
+    spread = _spread(presses, up)
     thickness = options.slab_m or max(_DEEP * contact, _SPREAD * spread)
     if presses.depth_m.max() >= thickness:
         raise SurfaceError(
@@ -94,14 +90,33 @@ def place_slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -
             "height_sd_m": float(tilt_sd[2]),
         },
         notes=tuple(notes),
-        doubt=_doubt(presses, residual, spread, options),
+        doubt=_doubt(presses, options),
     )
 
 
-def _doubt(presses: Presses, residual_m: np.ndarray, spread_m: float, options: GeometryOptions) -> str:
+def _top(presses: Presses, options: GeometryOptions) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The plane of a flat top: the one that was touched (`_plane`), or z = 0 as it is given."""
+    if options.pose == "given":
+        residual = presses.centre[:, 2] - presses.tip_radius_m
+        return np.array([0.0, 0.0, 1.0]), np.zeros(3), np.zeros((3, 3)), residual
+    return _plane(presses)
+
+
+def _spread(presses: Presses, up: np.ndarray) -> float:
+    """m, how far apart touches lie along a top with normal `up`."""
+    return float(np.ptp(presses.point @ support_axes(up)[:2].T, axis=0).max())
+
+
+def off_the_plane(presses: Presses, options: GeometryOptions) -> OffSurface | None:
+    """How far first touches lie off the plane that a slab or half-space has them on; None of too few."""
+    up, _, _, residual = _top(presses, options)
+    fitted, true_m = 3 * (options.pose == "auto"), _FLAT * _spread(presses, up)
+    return off_surface(residual, presses.site, presses.onset_error_m, true_m, fitted)
+
+
+def _doubt(presses: Presses, options: GeometryOptions) -> str:
     """Why the object is not flat; '' where first touches lie on a plane as they can, or are too few."""
-    fitted = 3 * (options.pose == "auto")
-    off = off_surface(residual_m, presses.site, presses.onset_error_m, _FLAT * spread_m, fitted)
+    off = off_the_plane(presses, options)
     if off is None or not off.words:
         return ""
     return f"the object is no {options.kind}: {off.words}; give its shape with --shape, or trace its base"

@@ -32,7 +32,7 @@ from palpate.render.base import Renderer
 from palpate.render.effects import rendered_touch
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.options import RenderOptions
-from palpate.render.surface.snapping import surface_uncertainty, touched_surface
+from palpate.render.surface.snapping import is_given, surface_uncertainty, touched_surface
 
 _LOG = logging.getLogger(__name__)
 OWN_DEPTH_M = 1e-3
@@ -233,7 +233,8 @@ def _load(model: Model) -> FeltSurface | None:
             data["normals"].astype(float),
             np.asarray(shape.regular_faces, dtype=np.int64),
             data["touchable"] > 0,
-            data["uncertainty_m"].astype(float),
+            # a folder of before held a doubt of a shape that is the object's own
+            np.where(is_given(model), 0.0, data["uncertainty_m"]).astype(float),
             stiffness,
             source,
         )

@@ -80,14 +80,22 @@ def _made(model: Model, edge_m: float, drawn: bool) -> ContactSurface:
     return dataclasses.replace(surface, arrays=moved)
 
 
+def is_given(model: Model) -> bool:
+    """Whether its shape is no measurement: a file's or a phantom's, not one that touches have placed."""
+    return model.mesh.shape is not None and model.shape_uncertainty_m is None
+
+
 def surface_uncertainty(model: Model, surface: ContactSurface) -> np.ndarray:
     """(v,) m, standard deviation of the fine vertices along their normals: the model's, less near touches.
 
     The model's shape uncertainty takes the place of the process's size DOUBT_M (which stands in where the
-    model has none); a first touch is known to ONSET_NOISE_M.
+    model has none); a first touch is known to ONSET_NOISE_M. A shape that is given without one is the
+    object's own, and so is what is felt of it.
     """
     arrays = surface.arrays
     own = model.shape_uncertainty_m
+    if is_given(model):
+        return np.zeros(len(arrays.vertices))
     if own is None:
         sd = np.full(len(arrays.vertices), DOUBT_M)
     else:

@@ -11,6 +11,8 @@ from palpate.operations._declare import written
 from palpate.operations._run import command_operation
 from palpate.show.page import file_words
 
+_OF_IMPORT = {"slab_m": "slab"}
+"""What import calls by another name."""
 _GEOMETRIES = {"shape", "slab_m", "half_space"}
 
 
@@ -25,6 +27,14 @@ def open_words(given: Mapping[str, Any], more: Mapping[str, Any]) -> str:
             value = {role: _named(text, given.get("names") or {}) for role, text in value.items()}
         told[name] = {**(told.get(name) or {}), **value} if isinstance(value, Mapping) else value
     return typed("open", told)
+
+
+def import_words(given: Mapping[str, Any], output: str) -> str:
+    """The command `palpate import` that leaves behind the recording which `palpate open` made of a table."""
+    fields = command_operation("import")[0].fields
+    told = {_OF_IMPORT.get(name, name): value for name, value in given.items()}
+    told["output"] = output
+    return typed("import", {name: value for name, value in told.items() if name in fields})
 
 
 def typed(name: str, given: Mapping[str, Any]) -> str:

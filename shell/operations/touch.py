@@ -153,6 +153,8 @@ def touch(
         return None
     scene = _named(scene)
     _check(name, renderer, beside, seconds, replay, headless)
+    if headless and screenshot is not None:
+        raise OptionError("--screenshot saves the window, and --headless has none: drop one of the two")
     for word in servo.loosened:
         print(f"palpate touch: {word}", file=sys.stderr)
 

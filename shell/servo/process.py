@@ -142,6 +142,10 @@ class ServoProcess:
         self._progress("loading the model", 0.0)
         renderer, model = self._source.make(self._progress)
         kind = self._device.spec
+        if kind.simulated and self.job.mapping is None and model is not None:
+            # a hand in this program moves in the model's frame, wherever the object lies in it
+            points = model.mesh.points
+            self._arrays.safety.workspace_centre[:] = 0.5 * (points.min(axis=0) + points.max(axis=0))
         scene = self._scene(renderer, model)
         self._progress("compiling the loop", 0.95)
         pickle.load(commands)  # GO

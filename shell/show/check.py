@@ -35,7 +35,8 @@ def story(result: Checkup) -> say.Story:
     looked = "samples, presses and modulus" if result.full else "samples and presses"
     said = f"{counted(len(findings), 'finding')}, {len(result.grave)} grave"
     said = said if findings else f"no findings in its {looked}"
-    yield say.Headline(f"{recording.name}, {recording.duration_s:.1f} s: {said}")
+    presses = {None: "", 1: ", 1 press"}.get(result.presses, f", {result.presses} presses")
+    yield say.Headline(f"{recording.name}, {recording.duration_s:.1f} s{presses}: {said}")
     yield say.Sentence(_meaning(result), on=say.PAGE)
     yield say.Next(_next_steps(result))
     yield from (say.TextLine(finding.line()) for finding in findings)

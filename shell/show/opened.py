@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from palpate.importing.kinds import Opened
-from palpate.operations._written import open_words
+from palpate.operations._written import import_words, open_words
 from palpate.show import story as say
 from palpate.show import story_of
-from palpate.show.page import feel_step
+from palpate.show.page import feel_step, file_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,19 +41,26 @@ def story(result: Opened) -> say.Story:
 
 
 def _steps(result: Opened) -> list[str]:
-    """What to do with a model of which no folder was written; nothing for another result."""
+    """What to do with a model of which no folder was written, or whose recording is another program's table;
+    nothing for another result."""
     from palpate.mechanics.model.model import Model
     from palpate.reconstruction.pipeline import Reconstruction
-    from palpate.show.reconstruction.story import mending
+    from palpate.show.reconstruction.story import as_far_as_believed, mending
 
     made = getattr(result.result, "model", result.result)
-    if not isinstance(made, Model) or made.path is not None:
+    if not isinstance(made, Model):
         return []
-    ways = mending(result.result) if isinstance(result.result, Reconstruction) else []
-    return [
-        *(f"{way.says}: `{open_words(result.said, way.options)}`" for way in ways),
-        feel_step(None, open_words(result.said, {"save": "MODEL"})),
-    ]
+    feel = feel_step(made.path, open_words(result.said, {"save": "MODEL"}))
+    if not isinstance(result.result, Reconstruction):
+        return [] if made.path is not None else [feel]
+    if result.result.recording.path is not None and made.path is not None:
+        return []
+    ways = [f"{way.says}: `{open_words(result.said, way.options)}`" for way in mending(result.result)]
+    recording = file_words(result.result.recording.path, "")
+    brought = "" if recording else f"`{import_words(result.said, 'REC.csv.gz')}`, "
+    model = file_words(made.path, "MODEL")
+    diagnosed = f"`palpate diagnose {recording or 'REC.csv.gz'} --model {model} --report PAGE.html`"
+    return as_far_as_believed(result.result, ways, feel, f"see what it leaves out: {brought}{diagnosed}")
 
 
 KEYS: tuple[say.Key, ...] = (

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
+import palpate as pp
 from palpate import cli
+from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.model.files import read_model
 from palpate.mechanics.recording.recording import write_recording
+from palpate.reconstruction.checks.registry import looked_at
 from palpate.reconstruction.geometry.known_shape import place
 from palpate.reconstruction.geometry.stated import GeometryOptions, nowhere
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
@@ -64,6 +67,22 @@ def test_first_touches_tell_that_an_object_is_not_flat(touches):
         assert place(flat, options, mesh_size_m=0.01, spacing_m=0.003).doubt == ""
 
 
+def test_a_dome_that_is_called_flat_is_refused_before_anything_is_computed_on_it(touches, monkeypatch):
+    """Two minutes went into a modulus that the first touches ruled out in two seconds."""
+
+    def computed(*_, **__):
+        raise AssertionError("it was laid on a plane and computed")
+
+    monkeypatch.setattr("palpate.reconstruction.pipeline.place", computed)
+    recording, _ = touches
+    for said in ({"half_space": True}, {"slab_m": 0.3}):
+        with pytest.raises(RecordingError, match="--shape"):
+            pp.reconstruct(recording, progress=False, **said)
+        (finding,) = looked_at(recording, GeometryOptions(**said))[0]
+        assert finding.grave and finding.ways
+        assert not looked_at(raster(), GeometryOptions(**said))[0]
+
+
 @pytest.mark.parametrize("depth_matters", [True, False])
 def test_a_modulus_is_weighed_against_a_constant_push(depth_matters):
     recording = raster(tilt=False)
@@ -97,5 +116,7 @@ def test_the_command_ends_with_one_and_writes_everything(tmp_path, capsys):
     assert said.startswith("not reliable")
     (line,) = [line for line in said.splitlines() if line.startswith("not reliable")]
     assert "another object's shape" in line
+    # and nothing beside it is said with certainty, or to be kept
+    assert "sure" not in said and "press there" not in said and "palpate touch" not in said
     assert read_model(model).material.young_modulus_pa > 0
     assert json.loads(figures.read_text())["doubt"] in line

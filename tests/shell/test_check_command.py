@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from palpate import cli
 from palpate.mechanics.recording.recording import write_recording
 
 from ..reconstruct.exploration_of_cylinder import explore_cylinder
+from ..reconstruct.flat_ground import raster
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +24,14 @@ def sound(tmp_path_factory):
 def test_a_sound_recording_passes(sound, capsys):
     assert cli.main(["check", str(sound)]) == 0
     assert "GRAVE" not in capsys.readouterr().out
+
+
+def test_presses_are_counted_of_a_whole_object_and_of_a_flat_one():
+    """One learnt how many were found after minutes, from the reconstruction."""
+    recording, onsets = explore_cylinder()
+    assert pp.check(recording, progress=False).presses == len(onsets)
+    flat = replace(raster((4, 4)), description={"object": {"half_space": True}})
+    assert pp.check(flat, progress=False).presses == 16
 
 
 def test_a_mirrored_one_fails_with_a_page_and_json(tmp_path, capsys):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
 import time
 
@@ -74,6 +75,19 @@ def test_a_terminal_shows_stage_share_and_what_is_left(monkeypatch):
         tell("effect 1: friction_slip", 0.5)
         text = until(terminal.getvalue, "left")
     assert "50%" in text and "diagnose: effect 1: friction_slip" in text and "left" in text
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are of POSIX")
+def test_a_terminal_that_says_no_size_is_told_all_the_same(monkeypatch):
+    """A container's or a log's terminal has 0 columns and 0 rows: every wait was silent there."""
+    outer, inner = os.openpty()
+    monkeypatch.delenv("COLUMNS", raising=False)
+    with open(inner, "w") as terminal, open(outer, "rb", buffering=0) as read:
+        monkeypatch.setattr(sys, "stderr", terminal)
+        with progress_bar("reconstruct") as tell:
+            tell("contacts", 0.5)
+        terminal.flush()
+        assert "reconstruct: contacts" in read.read(4096).decode()
 
 
 def test_a_batch_says_what_is_left_by_the_same_display(monkeypatch, tmp_path):

@@ -32,6 +32,7 @@ class PressPage extends SeenTip {
     $("depth-now").textContent = `${mm(this.wanted)} mm`;
     if (this.place && (this.held || this.pressing !== undefined) && this.goal > 0) this.goal = this.wanted;
     if (this.held && this.straight) this.tryPress(this.straight.at, this.wanted);
+    if ($("colour").checked) this.colour(true);
   }
 
   // The ray through a pointer, from the eye.
@@ -258,11 +259,15 @@ class PressPage extends SeenTip {
     $("scale").hidden = !by;
     if (!by) this.drawing.colourBy(null);
     else {
-      const at = 1e-3, count = this.surface.vertices.length / 3;
+      // at the depth of the next press: what lies deep shows where one presses deep
+      const at = this.wanted, count = this.surface.vertices.length / 3;
       const values = Float32Array.from({ length: count }, (_, v) => this.tables.response_([v, v, v], [1, 0, 0], at)[0]);
-      const sorted = values.slice().sort(), low = sorted[Math.floor(0.02 * count)], high = sorted[Math.floor(0.98 * count)];
+      const sorted = values.slice().sort(), valueAt = (share) => sorted[Math.floor(share * (count - 1))];
+      // Tukey's fence: a stiff rim would take all colours from what lies inside
+      const fence = valueAt(0.75) + 1.5 * (valueAt(0.75) - valueAt(0.25)), low = valueAt(0.02), high = Math.min(valueAt(0.98), fence);
+      $("stiffness").textContent = `stiffness at ${mm(at)} mm`;
       $("low").textContent = `${low.toPrecision(3)}`;
-      $("high").textContent = `${Math.max(high, 1.3 * low).toPrecision(3)} N/m`;
+      $("high").textContent = `${high < valueAt(1) ? "≥ " : ""}${Math.max(high, 1.3 * low).toPrecision(3)} N/m`;
       this.drawing.colourBy(values.map((v) => Math.min(1, Math.max(0, (v - low) / Math.max(high - low, 0.3 * low)))));
     }
     this.dirty = true;

@@ -45,7 +45,9 @@ def view(result: Comparison) -> View:
         for name in names
     ]
     colourings += usual_colourings(result.model, presses)
-    return view_of_presses(result.model, presses, colourings, lines, _worst(result))
+    off = local(presses, result.predicted["fem"] - presses.force)[presses.parts[_worst(result)]]
+    force = "sideways" if np.linalg.norm(off[:, 1:]) > np.linalg.norm(off[:, 0]) else "into"
+    return view_of_presses(result.model, presses, colourings, lines, _worst(result), force)
 
 
 def called(model: str) -> str:
@@ -70,21 +72,26 @@ def still(result: Comparison) -> Figure:
     values = spread_over(felt_surface(model).points, presses.point, each)[0]
     azimuth = facing(model.support.normal, presses.normal[worst])
     draw_object(left, model, Colours(values, ERROR), touches=presses.point, azimuth_deg=azimuth)
-    rows = presses.parts[worst]
-    depth, normal = presses.depth[rows] * 1e3, presses.normal[worst]
-    right.plot(depth, presses.push[rows], color=COLOURS["measured"], lw=1.8, label="measured")
-    for name in ("fem", *RIVALS):
-        right.plot(
-            depth,
-            result.predicted[name][rows] @ normal,
-            color=colour_of(name),
-            lw=1.2,
-            label=called(name),
-        )
-    right.set(xlabel="depth [mm]", ylabel="force into the surface [N]", title=f"press {worst + 1}")
-    right.legend(frameon=False, fontsize=8.5)
-    right.spines[["top", "right"]].set_visible(False)
+    press_curves(right, result, worst)
     return figure
+
+
+def press_curves(ax: Axes, result: Comparison, press: int) -> None:
+    """Force over depth, into the surface and along it: an error is of the whole vector."""
+    presses, rows = result.presses, result.presses.parts[press]
+    depth, measured = presses.depth[rows] * 1e3, local(presses, presses.force)[rows]
+    pull = (measured * np.linalg.norm(measured[:, 1:], axis=1)[:, None]).sum(axis=0) * [0.0, 1.0, 1.0]
+    along = pull / max(float(np.linalg.norm(pull)), 1e-12)
+    forces = {"measured": presses.force, **{name: result.predicted[name] for name in ("fem", *RIVALS)}}
+    for name, force in forces.items():
+        here = local(presses, force)[rows]
+        style = {"color": colour_of(name), "lw": 1.8 if name == "measured" else 1.2}
+        ax.plot(depth, here[:, 0], label=called(name), **style)
+        ax.plot(depth, here @ along, ls="--", **style)
+    ax.plot([], [], color=COLOURS["reference"], ls="--", lw=1.2, label="dashed: sideways")
+    ax.set(xlabel="depth [mm]", ylabel="force, into the surface and sideways [N]", title=f"press {press + 1}")
+    ax.legend(frameon=False, fontsize=8.5)
+    ax.spines[["top", "right"]].set_visible(False)
 
 
 def _worst(result: Comparison) -> int:

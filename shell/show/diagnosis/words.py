@@ -39,6 +39,8 @@ def meaning(name: str) -> str:
 
 MOST_SETS = 4
 """Of causes that words tell; the JSON holds all."""
+FIRST_LIMITS = 3
+"""Limits that the first screen of a page tells; the table of what was tried has each."""
 LITTLE = 0.1
 """A share of the difference below which it is not said to depend on something."""
 
@@ -62,6 +64,9 @@ def verdict(result: Diagnosis) -> str:
         )
     if not left_out:
         said = f"Nothing new is missing: what these touches show is {there}, which the model already has"
+    elif result.kind == "ambiguous" and rivals and not _likelier_than_not(result):
+        what = spoken([*missing(result), *result.candidates], "or")
+        return f"The simulation leaves something out, and these touches cannot tell what: {what}."
     elif result.kind == "ambiguous":
         said = f"The simulation leaves something out: most likely {left_out}"
     else:
@@ -73,6 +78,12 @@ def verdict(result: Diagnosis) -> str:
     if "unknown" in result.kind:
         return f"{said}. Something else is missing that this program does not know."
     return f"{said}."
+
+
+def _likelier_than_not(result: Diagnosis) -> bool:
+    """Whether each effect that is named and missing is there by more than half of the odds."""
+    named = missing(result)
+    return all(e.probability > 0.5 for e in result.entries if e.name in named)
 
 
 def consequence(result: Diagnosis, force_rms_n: float) -> str:
@@ -116,7 +127,7 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
     if result.kind == "none":
         smaller = "Smaller ones may be there; deeper, faster or longer touches would show them."
         weighed = f"These touches leave open: {left}. " if result.candidates else ""
-        text = f"{weighed}{begun(limits(result))}. {smaller}"
+        text = f"{weighed}{begun(limits(result, FIRST_LIMITS))}. {smaller}"
         return question, "Larger effects would have been named", text
     if result.candidates:
         also = "; ".join(f"{spaced(n)}: {meaning(n)}" for n in result.candidates)
@@ -142,12 +153,17 @@ def _set(names: Sequence[str]) -> str:
     return " and ".join(map(spaced, names)) or "nothing that is missing"
 
 
-def limits(result: Diagnosis) -> str:
-    """From which size on each effect would have been named, the smallest first, and what never would."""
+def limits(result: Diagnosis, most: int | None = None) -> str:
+    """From which size on each effect would have been named, the smallest first, and what never would; most:
+    so many of the smallest, and the largest."""
     known = {e.name: e.detectable_n for e in result.entries if not np.isnan(e.detectable_n)}
     never = [name for name, limit in known.items() if np.isinf(limit)]
     ranked = sorted((n for n in known if n not in never), key=lambda n: known[n])
-    from_size = listed(f"{spaced(n)} from {force_words(known[n])}" for n in ranked)
+    shown = ranked if most is None or len(ranked) <= most + 1 else [*ranked[:most], ranked[-1]]
+    each = [f"{spaced(n)} from {force_words(known[n])}" for n in shown]
+    if len(shown) < len(ranked):
+        each.insert(most or 0, f"{len(ranked) - len(shown)} others (What was tried?)")
+    from_size = listed(each)
     said = [f"named in 19 of 20 such recordings would be {from_size}"] if ranked else []
     said += [f"at no size {spoken(never)}"] if never else []
     return "; ".join(said)
@@ -161,15 +177,12 @@ def where(result: Diagnosis) -> tuple[str, str, str]:
         rms = float(press_gaps(result)[worst_press(result)])
     largest = place_mm(there_m)
     question = "Where does it show?"
-    if result.kind == "none":
-        text = (
-            "No place, depth or speed stands out beyond what noise, first touch and shape may do. The "
-            f"largest difference is {force_words(rms)}, at {largest} (the press shown)."
-        )
-        return question, "Nowhere in particular", text
     # the gap of held-out places may exceed what a fit leaves at the worst place: the smaller one is not said
     size = f": {force_words(rms)}" if rms > result.gap_before_n else ""
     there = f"It is largest at {largest} (the press shown){size}."
+    if result.kind == "none":
+        none = "No place, depth or speed stands out beyond what noise, first touch and shape may do."
+        return question, "Nowhere in particular", f"{none} {there}"
     if axis.share < LITTLE:
         most = f"It depends most on {AXIS_WORDS[axis.axis]}, which explains {percent(axis.share)} of it."
         return question, "Everywhere alike", f"{most} {there}"

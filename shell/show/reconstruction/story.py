@@ -63,11 +63,11 @@ def story(result: Reconstruction, beside: dict[str, Model] | None = None) -> say
         yield say.Headline(f"not reliable: {result.doubt}", on=say.TEXT)
         yield say.Headline(f"Not reliable: {result.doubt.partition(': ')[0]}", on=say.PAGE)
         yield say.Sentence(result.doubt, on=say.PAGE)
+    sure, surely = ("not to be believed",) * 2 if result.doubt else (sure_kpa(ends), sure_kpa(ends, ".1f"))
     yield say.Headline(
-        f"{exploration.recording.name}: {presses}, Young's modulus {kpa(modulus)} ({sure_kpa(ends)})",
-        on=say.TEXT,
+        f"{exploration.recording.name}: {presses}, Young's modulus {kpa(modulus)} ({sure})", on=say.TEXT
     )
-    became = f"{presses} became a model of {kpa(modulus, '.1f')} (Young's modulus; {sure_kpa(ends, '.1f')})"
+    became = f"{presses} became a model of {kpa(modulus, '.1f')} (Young's modulus; {surely})"
     yield (say.Sentence if result.doubt else say.Headline)(became, on=say.PAGE)
     yield from _meant(result)
     yield say.Next(next_steps(result))
@@ -103,7 +103,7 @@ def _paper(result: Reconstruction, beside: dict[str, Model] | None) -> say.Story
 def _meant(result: Reconstruction) -> say.Story:
     if not result.doubt:
         yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in meaning(result).split(". "))
-    yield say.Detail(meaning(result), on=say.PAGE)
+        yield say.Detail(meaning(result), on=say.PAGE)
 
 
 def _made(result: Reconstruction) -> say.Story:
@@ -131,7 +131,7 @@ def _made(result: Reconstruction) -> say.Story:
         )
     yield from (say.TextLine(dropped) for dropped in exploration.dropped)
     yield say.TextLine(f"surface: {surface.method}, {surface.volume_m3 * 1e6:.1f} cm³; {surface.reason}")
-    if surface.shape is None:
+    if shaped_by_touches(result):
         yield say.Detail(least_known(surface), on=say.TEXT)
     yield from (say.Detail(note, on=say.TEXT) for note in (result.placed.notes if result.placed else ()))
     off = mm(result.meshing.report.surface_distance_m.max(), ".2f")
@@ -261,11 +261,18 @@ def next_steps(result: Reconstruction) -> list[str]:
     recording = file_words(result.exploration.recording.path, "REC")
     where = file_words(result.model.path, "MODEL")
     given = {"files": (result.exploration.recording,), "save": where}
-    return [
-        *(f"{way.says}: `{open_words(given, way.options)}`" for way in mending(result)),
-        feel_step(result.model.path, f"palpate reconstruct {recording} -o MODEL"),
-        f"see what it leaves out: `palpate diagnose {recording} --model {where} --report PAGE.html`",
-    ]
+    ways = [f"{way.says}: `{open_words(given, way.options)}`" for way in mending(result)]
+    feel = feel_step(result.model.path, f"palpate reconstruct {recording} -o MODEL")
+    left_out = f"see what it leaves out: `palpate diagnose {recording} --model {where} --report PAGE.html`"
+    return as_far_as_believed(result, ways, feel, left_out)
+
+
+def as_far_as_believed(result: Reconstruction, ways: list[str], feel: str, left_out: str) -> list[str]:
+    """Steps that can be proposed: ways to mend it; of a shape that is another object's nothing else, and what
+    does not predict is looked into, not kept."""
+    if result.placed is not None and result.placed.doubt:
+        return ways
+    return [*ways, left_out] if result.doubt else [*ways, feel, left_out]
 
 
 def mending(result: Reconstruction) -> list[Way]:
@@ -296,6 +303,11 @@ def meaning(result: Reconstruction) -> str:
     return words
 
 
+def shaped_by_touches(result: Reconstruction) -> bool:
+    """Whether the surface goes by the touches alone, so that another one would tell more of it."""
+    return result.placed is None and result.surface.shape is None
+
+
 def least_known(surface: Surface) -> str:
     """How well a shape is known, and where to press to know it better, in words; standard deviations."""
     place, sd_m = surface.least_known
@@ -308,7 +320,7 @@ def least_known(surface: Surface) -> str:
 
 def _how(result: Reconstruction) -> say.Story:
     surface = result.surface
-    known = f" It is {least_known(surface)}." if surface.shape is None else ""
+    known = f" It is {least_known(surface)}." if shaped_by_touches(result) else ""
     method = "The method takes the tip's size into account, where the paper presses with a point."
     if paper_remade(result):
         method = "The method is the paper's own."

@@ -12,7 +12,7 @@ import trimesh
 from palpate.diagnosis.explore.candidates import Known, ReachOptions, after_touch, modulus_after, press_depth
 from palpate.diagnosis.explore.explorer import Explorer
 from palpate.diagnosis.explore.goals import GoalOptions, GoalState, surface_error
-from palpate.diagnosis.explore.segments import Instrument, Segment, join
+from palpate.diagnosis.explore.segments import Instrument, Segment, join, split
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.robot import segment_of, serve
 
@@ -224,6 +224,19 @@ def test_touches_that_were_off_widen_what_a_surface_says_of_itself():
     assert explorer._doubt == 1.0
     explorer._tests = [8.0]
     assert explorer._doubt > 3
+
+
+@pytest.mark.slow
+def test_an_exploration_goes_on_as_sure_as_it_ended():
+    """What its last touches said of the surface was forgotten: it went on surer than it had stopped."""
+    instrument, segments = split(explore_cylinder()[0])
+    explorer = Explorer(instrument)
+    for segment in segments[:7]:
+        explorer.add(segment)
+    ended, goes_on = explorer.state, Explorer.going_on(explorer.recording).state
+    assert goes_on.presses == ended.presses and explorer._tests
+    assert goes_on.surface_error_m == pytest.approx(ended.surface_error_m, rel=1e-3)
+    np.testing.assert_allclose(goes_on.modulus_ci95_pa, ended.modulus_ci95_pa, rtol=0.05)
 
 
 def test_a_robot_in_the_laboratory_presses_as_fast_and_as_long_as_it_is_told():

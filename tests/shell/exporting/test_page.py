@@ -253,6 +253,24 @@ def test_the_tip_shows_once_what_it_does_unless_less_motion_is_liked(tab, writte
 
 
 @needs_browser
+def test_stiffness_is_coloured_at_the_depth_that_one_presses_to(tab):
+    """It was that of 1 mm, whatever was pressed: a nodule that a deep press feels was never to be seen."""
+
+    def painted(depth_m: float) -> list[float]:
+        tab.evaluate(f"palpate.page.setDepth({depth_m})")
+        return tab.evaluate("[...palpate.page.drawing.values]")
+
+    tab.evaluate("document.getElementById('colour').click()")
+    shallow, deep = painted(0.001), painted(0.008)
+    assert len(shallow) == len(deep) and np.abs(np.subtract(shallow, deep)).max() > 0.02
+    assert "8.0 mm" in tab.evaluate("document.getElementById('scale').textContent")
+    # most of the object lies within the colours, however stiff its rim
+    assert 0.2 < np.percentile(deep, 75) - np.percentile(deep, 25)
+    (_, scale, _, tall), (_, hint, _, _) = box(tab, "scale"), box(tab, "hint")
+    assert scale + tall <= hint, "one lies over the other"
+
+
+@needs_browser
 def test_a_drag_beside_the_object_turns_it_and_the_wheel_zooms(tab):
     left, top, width, height = box(tab)
     azimuth, zoom = state(tab, "camera.azimuth"), state(tab, "camera.zoom")
@@ -300,6 +318,10 @@ def test_fingers_on_a_phone(shown, written):
     shown.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
     try:
         assert shown.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is cut off"
+        shown.evaluate("document.getElementById('colour').click()")
+        (_, scale, _, tall), (_, reading, _, high) = (box(shown, name) for name in ("scale", "parts"))
+        assert tall and (scale >= reading + high or scale + tall <= reading), "one lies over the other"
+        shown.evaluate("document.getElementById('colour').click()")
         x, y = on_the_object(shown)
 
         def touch(kind: str, *places: tuple[float, float]) -> None:

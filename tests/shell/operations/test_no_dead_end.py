@@ -18,7 +18,7 @@ from palpate.mechanics.errors import ContactError, OptionError, RecordingError
 from palpate.mechanics.recording.recording import write_recording
 from palpate.operations._list import OPERATIONS
 from palpate.operations._run import parser_of
-from palpate.operations._written import open_words
+from palpate.operations._written import import_words, open_words
 from palpate.reconstruction.checks.registry import looked_at
 from palpate.show import next_lines
 
@@ -217,6 +217,18 @@ def test_a_log_without_a_foot_is_told_the_commands_that_go_on_with_it(tmp_path, 
     assert all(f"--tip-radius {TIP_M:g} {flag}" in page for flag in ("--shape", "--slab", "--half-space"))
 
 
+def test_a_table_that_was_opened_can_be_left_behind_as_the_recording_that_it_was_taken_for(
+    tmp_path, monkeypatch
+):
+    """A diagnosis of REC was proposed, and no recording was there."""
+    monkeypatch.chdir(tmp_path)
+    robots_log(tmp_path)
+    given = {"files": ("robot.csv",), "save": "MODEL", "tip_radius_m": TIP_M, "slab_m": 0.3, "unit": "mm"}
+    assert main(shlex.split(import_words(given, "REC.csv.gz"))[1:]) == 0
+    left = pp.read_recording("REC.csv.gz")
+    assert left.tip_radius_m == TIP_M and left.description["object"]["slab_m"] == 0.3
+
+
 @pytest.mark.slow
 def test_the_command_that_is_told_reaches_the_truth(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -228,6 +240,7 @@ def test_the_command_that_is_told_reaches_the_truth(tmp_path, monkeypatch, capsy
     assert float(re.search(r"modulus ([\d.]+) kPa", said)[1]) == pytest.approx(MODULUS_PA / 1e3, rel=0.05)
     # no folder was written, so none is named as if it were there
     assert "palpate touch MODEL" not in said or "--output MODEL" in said
+    assert "palpate import robot.csv" in said, "it leaves the recording that is to be diagnosed"
 
 
 def test_what_says_nothing_of_such_a_file_is_refused(tmp_path):

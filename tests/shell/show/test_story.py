@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.show import story as say
-from palpate.show.page import Page
+from palpate.show.comparison.figures import press_curves
+from palpate.show.diagnosis.words import limits, verdict, where
+from palpate.show.page import Page, new_figure
 from palpate.words import (
     MOST_WORDS,
     ended,
@@ -23,6 +27,8 @@ from palpate.words import (
     spoken,
     sure_kpa,
 )
+
+from ...reconstruct.exploration_of_cylinder import explore_cylinder
 
 
 def printed(*blocks: say.Told) -> str:
@@ -159,3 +165,53 @@ def test_a_chapter_is_folded_its_parts_are_headings_in_it_and_one_without_words_
     assert re.findall(r'href="#(chapter-\d)">([^<]*)<', said) == [
         ("chapter-1", "What for?"), ("chapter-2", "At once?")
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["none", "effect"])
+def test_the_largest_difference_is_never_said_smaller_than_a_typical_one(kind):
+    """At held-out places it may be: "typically 23 mN off … the largest difference is 21 mN" stood there."""
+    axis = SimpleNamespace(axis="space", share=0.4, p=0.01)
+    of_places = SimpleNamespace(leading=axis, worst=((0.01, 0.0, 0.05, 0.021),))
+    for typical_n, is_said in ((0.023, False), (0.012, True)):
+        result = SimpleNamespace(where=of_places, forward=None, kind=kind, gap_before_n=typical_n)
+        assert ("21 mN" in where(result)[2]) == is_said
+
+
+def test_a_press_of_the_comparison_shows_what_is_off_sideways():
+    """The error is of the whole force; the curve beside it showed only what goes into the surface."""
+    presses = explore(explore_cylinder()[0]).presses
+    aside = 0.3 * presses.frame[presses.press][:, 1]
+    predicted = {name: presses.force + aside for name in ("fem", "kelvin-voigt", "hunt-crossley")}
+    ax = new_figure(4, 3).subplots()
+    press_curves(ax, SimpleNamespace(presses=presses, predicted=predicted), 0)
+    measured, fem = (line.get_ydata() for line in ax.lines[1:4:2])
+    assert np.abs(fem - measured).max() > 0.1
+
+
+@pytest.mark.parametrize(("share", "called_likely"), [(0.33, False), (0.8, True)])
+def test_what_has_a_third_of_the_odds_is_not_called_most_likely(share, called_likely):
+    """ "Most likely a compliant base" was the headline of 33 %."""
+    entries = [
+        SimpleNamespace(name=n, probability=p) for n, p in (("compliant_base", share), ("inclusion", 0.2))
+    ]
+    said = verdict(
+        SimpleNamespace(
+            kind="ambiguous",
+            effects=("compliant_base",),
+            candidates=("inclusion",),
+            entries=entries,
+            model=None,
+        )
+    )
+    assert ("most likely" in said) == called_likely
+    assert "compliant base" in said and "inclusion" in said
+
+
+def test_a_first_screen_tells_few_limits_and_a_terminal_all():
+    """Nineteen stood on it, in a card as high as a laptop's screen."""
+    entries = [SimpleNamespace(name=f"effect_{k}", detectable_n=1e-3 * (k + 1)) for k in range(19)]
+    result = SimpleNamespace(entries=entries)
+    assert limits(result).count(" from ") == 19
+    few = limits(result, 3)
+    assert few.count(" from ") == 4 and "15 others" in few and "effect 18 from 19 mN" in few
+    assert limits(SimpleNamespace(entries=entries[:4]), 3).count(" from ") == 4

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ import pytest
 
 import palpate as pp
 from palpate.cli import main
+from palpate.mechanics.model.files import write_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import read_recording
 from palpate.window.base_tracing import BaseTracing
@@ -42,6 +44,19 @@ def test_headless_session_with_a_recording(
     assert recording.t[-1] > 2.0 and recording.object_name == block.path.name
 
 
+@pytest.mark.slow
+def test_an_object_far_from_the_origin_is_felt_as_it_is_rendered(block: Model, tmp_path: Path) -> None:
+    """The hand in the program works over the object, wherever its mesh lies."""
+    shift = np.array([1.3, -0.4, 0.2])
+    support = replace(block.support, point=block.support.point + shift)
+    mesh = replace(block.mesh, points=block.mesh.points + shift)
+    presses = replace(block.presses, point=block.presses.point + shift)
+    moved = block.replaced(mesh=mesh, support=support, presses=presses, path=None)
+    path = write_model(tmp_path / "far", moved)
+    felt = pp.touch(path, headless=True, seconds=3.0, renderer="kelvin-voigt", stale_s=2.0).report
+    assert felt.peak_force_n > 0.3 and "outside the workspace" not in felt.reasons
+
+
 def test_a_model_that_is_in_no_folder_is_to_be_saved_before_a_window_or_a_device_touches_it(block: Model):
     with pytest.raises(pp.OptionError, match="save"):
         pp.touch(block.replaced(path=None), headless=True)
@@ -54,6 +69,7 @@ def test_a_model_that_is_in_no_folder_is_to_be_saved_before_a_window_or_a_device
         (["--headless", "--device", "glove"], "mouse, spacemouse"),
         (["--headless", "--renderer", "magic"], "allowed are fem"),
         (["--headless", "--seconds", "-1"], "greater than 0"),
+        (["--headless", "--screenshot", "seen.png"], "--screenshot"),
         (["--headless", "--device", "replay"], "--replay REC"),
         (["--headless", "--device", "spacemouse"], "plug"),
     ],

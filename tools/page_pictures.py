@@ -1,0 +1,59 @@
+"""Make the pictures of pages and of comparisons in `docs/images`, by a browser: `page-demo`, `page-phone`,
+`compare-by-press`, `compare-left-out-top`.
+
+The demo and the comparison are of the embedded cylinder; the phone's is the page of a diagnosis, in the dark.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from contextlib import chdir
+from pathlib import Path
+from typing import Any
+
+import palpate as pp
+from palpate.mechanics.disk.writing import PNG, atomic_file
+from palpate.operations.demo import demo
+from palpate.show.comparison import draw
+from palpate.show.comparison.figures import across_region
+from palpate.show.page import drawn, png_and_drawing
+from tests.shell.show.browser import a_tab
+from tools.script import script
+
+FOLDER = Path(__file__).parent.parent / "docs" / "images"
+REGION = "top"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Where they go, and the page of the diagnosis."""
+    parser.add_argument("diagnosis", type=Path, help="a page of `palpate diagnose REC --report PAGE.html`")
+    parser.add_argument("--folder", type=Path, default=FOLDER, help="where they are written")
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Write the four; nothing to tell of them."""
+    folder: Path = arguments.folder
+    compared = pp.compare("silicone-1-cylinder", progress=False)
+    _write(folder / "compare-by-press.png", drawn(draw, compared, 8, 3.2, layout=None))
+    (top,) = (r.region for r in compared.regions if r.region.name == REGION)
+    _write(folder / "compare-left-out-top.png", across_region(compared, top.members))
+    diagnosis, folder = arguments.diagnosis.resolve(), folder.resolve()
+    with tempfile.TemporaryDirectory() as work, chdir(work), a_tab(Path(work) / "profile") as tab:
+        demo(window=False)
+        tab.open(Path(work) / "palpate-demo" / "report.html", 900, 680)
+        tab.picture(folder / "page-demo.png")
+        tab.open(diagnosis, 390, 844, dark=True)
+        tab.evaluate("document.querySelector('.view3d').scrollIntoView()")
+        tab.picture(folder / "page-phone.png")
+    return {}
+
+
+def _write(path: Path, figure: Any) -> None:
+    with atomic_file(path, PNG) as temporary:
+        temporary.write_bytes(png_and_drawing(figure)[0])
+
+
+if __name__ == "__main__":
+    sys.exit(script(sys.modules[__name__]))
