@@ -105,6 +105,11 @@ class Recording(Result):
         """(n,) N, length of the force."""
         return np.linalg.norm(self.force_on_tool, axis=1)
 
+    @property
+    def tip_assumed(self) -> bool:
+        """Whether the samples are another program's, and nobody said that its tip is a sphere."""
+        return "import" in self.description and "tip" not in self.description.get("tool", {})
+
     def save(self, path: Path | str) -> Path:
         """Write NAME.csv.gz (or .csv) and NAME.toml; returns the samples' path."""
         return write_recording(path, self)
@@ -332,6 +337,10 @@ def description_table(recording: Recording) -> dict[str, Any]:
         table["object"]["poisson_ratio"] = recording.poisson_ratio
     if recording.base_model is not None:
         table["object"]["model"] = str(recording.base_model)
+    if "tip" in (tool := recording.description.get("tool", {})):
+        table["tool"]["tip"] = tool["tip"]
+    if recording.tip_assumed:
+        table["import"] = {}
     if recording.segments:
         table["segment"] = [dataclasses.asdict(each) for each in recording.segments]
     if recording.truth is not None:

@@ -40,7 +40,7 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     if said.tip_radius_m is None:
         raise Unclear("the tip's radius in m is in no table", "tip_radius_m", ())
     columns = find_columns(tables, said)
-    notes = _sizes(columns)
+    notes = [*said.notes, *_sizes(columns)]
     streams = {
         part: stream_of(part, [columns[r] for r in roles if r in columns], columns, tables, said, notes)
         for part, roles in PARTS.items()
@@ -155,4 +155,5 @@ def _description(said: Said, quasi_static: bool, read_hz: float | None) -> dict[
     about: dict[str, Any] = {"quasi_static": True} if quasi_static else {}
     if read_hz is not None:
         about["read_rate_hz"] = read_hz
-    return {"recording": about, "object": dict(said.thing)}
+    tool = {} if said.tip is None else {"tip": said.tip}
+    return {"recording": about, "tool": tool, "object": dict(said.thing), "import": {}}

@@ -120,7 +120,7 @@ def open(
     if kind != "curves":
         _sphere_alone(tip, tip_angle_deg, files[0])
     opened = {"files": files, "save": save, **of_log, **how}
-    made = partial(_reconstructed, files, opened, how, save=save, seed=seed, progress=call.wanted)
+    made = partial(_reconstructed, files, opened, how, save=save, tip=tip, seed=seed, progress=call.wanted)
     match kind:
         case "model":
             result = _model(files)
@@ -228,6 +228,7 @@ def _reconstructed(
     odds: float | None = None,
     *,
     save: str | Path | None,
+    tip: str | None,
     seed: int,
     progress: bool | Progress,
 ) -> Opened:
@@ -245,7 +246,7 @@ def _reconstructed(
     result: Any = Checkup(recording, findings, seen, opened=opened)
     if how.get("force") or not result.grave:
         result = reconstruct(
-            recording, save=save, seed=seed, progress=progress, **{"field": "where-beaten", **how}
+            recording, save=save, tip=tip, seed=seed, progress=progress, **{"field": "where-beaten", **how}
         )
     return Opened(
         "recording", _names(files), understood, result=result, notes=notes, odds=odds or 1e6, said=opened

@@ -107,10 +107,9 @@ def _taken(result: Reconstruction) -> str:
     who = "as the recording says" if ratio == said else "as stated"
     if said is None and result.model.provenance["options"].get("poisson_ratio") is None:
         who = "assumed: --poisson-ratio sets another"
-    form = "" if "tip" in recording.description.get("tool", {}) else " (assumed: no file says its form)"
-    return (
-        f"for Poisson's ratio {ratio:.3g} ({who}), under a sphere of {mm(model.tool.tip_radius_m, 'g')}{form}"
-    )
+    form = " (assumed: --tip states another form)" if recording.tip_assumed else ""
+    tip = f"a sphere of {mm(model.tool.tip_radius_m, 'g')} radius{form}"
+    return f"for Poisson's ratio {ratio:.3g} ({who}), under {tip}"
 
 
 def _meant(result: Reconstruction) -> say.Story:
