@@ -202,7 +202,11 @@ def read_recording(path: Path | str) -> Recording:
     about, sensor = table.get("recording", {}), table.get("sensor", {})
     thing, tool = table.get("object", {}), table.get("tool", {})
     if tool.get("tip", "sphere") != "sphere":
-        raise RecordingError(other_tip(tool["tip"], f"'{description}': [tool] tip", str(samples)))
+        raise RecordingError(
+            other_tip(
+                tool["tip"], f"'{description}': [tool] tip", str(samples), tool.get("tip_radius_m"), own=True
+            )
+        )
     for name, part, key in (("recording", about, "force_on"), ("tool", tool, "tip_radius_m")):
         if key not in part:
             words = SCHEMA[name][key].words  # type: ignore[index, union-attr]

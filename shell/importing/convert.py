@@ -93,8 +93,8 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
 
 
 def _sizes(columns: dict[str, Column]) -> list[str]:
-    """Warnings of sizes that no palpation has in the unit that nobody said; raises RecordingError for a path
-    that no arm reaches."""
+    """Warnings of sizes that no palpation has in the unit that nobody said; raises Unclear for a path that no
+    arm reaches."""
     found = []
     for kind, roles, units in (
         ("position", ("x", "y", "z"), ("mm", "um", "nm")),
@@ -110,10 +110,10 @@ def _sizes(columns: dict[str, Column]) -> list[str]:
             "force": f"the force goes up to {size:.3g} N",
         }[kind]
         likely = next((u for u in units if size * SI[kind][u] <= most), units[-1])
-        hint = f"{seen} in the unit assumed: is it {likely}? say --units {kind}={likely}"
+        hint = f"{seen} in the unit assumed: is it {likely}?"
         if kind == "position":
-            raise RecordingError(hint)
-        found.append(f"WARNING: {hint}")
+            raise Unclear(hint, "units", (f"position={likely}",))
+        found.append(f"WARNING: {hint} say --units {kind}={likely}")
     return found
 
 

@@ -49,7 +49,15 @@ def sphere_or_ask(
 def with_tip(recording: Recording, form: str) -> Recording:
     """With its tip's form stated. Raises RecordingError for one that no recording has."""
     if form != "sphere":
-        raise RecordingError(other_tip(form, "--tip", str(recording.path or "FILE")))
+        raise RecordingError(
+            other_tip(
+                form,
+                "--tip",
+                str(recording.path or "FILE"),
+                recording.tip_radius_m,
+                own=recording.path is not None,
+            )
+        )
     held = dict(recording.description)
     return replace(recording, description={**held, "tool": {**held.get("tool", {}), "tip": form}})
 

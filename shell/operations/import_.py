@@ -164,7 +164,7 @@ def import_table(
         raise OptionError("pp.import_table needs a file")
     chosen = Said(**of_tables([Path(file) for file in files], held))
     if chosen.tip not in (None, "sphere"):
-        raise RecordingError(other_tip(str(chosen.tip), "the tip", str(files[0])))
+        raise RecordingError(other_tip(str(chosen.tip), "the tip", str(files[0]), chosen.tip_radius_m))
     tables = [table for file in files for table in read_tables(file)]
     understood = understand(tables, chosen, Path(files[0]).name.split(".")[0])
     result = Imported(understood, chosen.thing, tuple(Path(file).name for file in files))

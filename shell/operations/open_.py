@@ -118,7 +118,7 @@ def open(
     _refuse_idle(kind, files[0], how)
     of_tip = {"tip": tip, "tip_angle_deg": tip_angle_deg}
     if kind != "curves":
-        _sphere_alone(tip, tip_angle_deg, files[0])
+        _sphere_alone(tip, tip_angle_deg, files[0], tip_radius_m, own=kind == "recording")
     opened = {"files": files, "save": save, **of_log, **how}
     made = partial(_reconstructed, files, opened, how, save=save, tip=tip, seed=seed, progress=call.wanted)
     match kind:
@@ -253,11 +253,13 @@ def _reconstructed(
     )
 
 
-def _sphere_alone(tip: str | None, angle_deg: float | None, file: Any) -> None:
+def _sphere_alone(
+    tip: str | None, angle_deg: float | None, file: Any, radius_m: float | None, *, own: bool
+) -> None:
     """Raise OptionError for a tip that recordings, surfaces and models know nothing of."""
     form = tip or ("sphere" if angle_deg is None else "cone")
     if form != "sphere":
-        raise OptionError(other_tip(form, "--tip", str(file)))
+        raise OptionError(other_tip(form, "--tip", str(file), radius_m, own=own))
 
 
 def _only(files: tuple[Any, ...]) -> Any:
