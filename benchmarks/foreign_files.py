@@ -104,6 +104,8 @@ def outcome_of(made: Export) -> str:
             if answer and asked + 1 < _ANSWERS:
                 said |= answer
                 continue
+            if "press slower" in str(refused):
+                return "refused with a cure"
             if asked:
                 return "asked in vain"
             return "refused with a cure" if "--" in str(refused) else "refused without"
