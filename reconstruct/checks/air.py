@@ -8,6 +8,7 @@ import numpy as np
 
 from palpate.reconstruction.checks.finding import Finding
 from palpate.reconstruction.checks.samples import Samples
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import noise_gain
 
 _SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
@@ -42,6 +43,24 @@ def air(data: Samples) -> Iterator[Finding]:
         np.inf,
         (float(data.recording.t[0]), float(data.recording.t[-1])),
         ("fx", "fy", "fz"),
+    )
+
+
+def sloping(measured: Measured) -> Iterator[Finding]:
+    """Free air that slopes with the travel, which was taken off, with what it is known by in the interval."""
+    slope, presses = measured.air_slope, measured.presses
+    if slope is None:
+        return
+    peak = float(np.median([presses.push[part].max() for part in presses.parts]))
+    deep = float(np.median(presses.depth_m))
+    yield Finding(
+        "sloping free air",
+        f"before and after touch the force changes by {slope.n_per_m:.3g} N a metre of travel, "
+        f"{100 * abs(slope.n_per_m) * deep / peak:.2g} % of a press's peak over its depth; it is taken off",
+        f"known to {slope.error_n_per_m:.2g} N/m, alike on the way in and out",
+        "free the cable, or the spring beside the tip",
+        slope.error_n_per_m * deep / peak,
+        np.inf,
     )
 
 

@@ -237,7 +237,13 @@ def test_files_as_people_export_them_are_right_or_asked(tmp_path, seed):
         assert "--" in str(refused)
 
 
-@pytest.mark.parametrize("seed", range(len(KINDS)), ids=KINDS)
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(seed, id=kind, marks=[pytest.mark.slow] if kind in ("parts", "log") else [])
+        for seed, kind in enumerate(KINDS)
+    ],
+)
 def test_what_nobody_had_tried_is_right_or_asked(tmp_path, seed):
     outcome = outcome_of(strange_export(tmp_path, seed))
     assert outcome in OUTCOMES[:3]
