@@ -1,4 +1,4 @@
-"""Free air that slopes with the travel moves no modulus of a flat object; what looks like it is left alone."""
+"""Free air that slopes with the travel moves no modulus of a flat object; what looks like it is left."""
 
 from __future__ import annotations
 
