@@ -46,3 +46,5 @@ def test_slow_readings_do_not_move_the_modulus_wherever_they_fall(tmp_path, late
     recording = pp.read_table(log(tmp_path, 10, late_s), tip_radius_m=RADIUS)
     made = pp.reconstruct(recording, half_space=True, tip="sphere", progress=False)
     assert made.young_modulus_pa == pytest.approx(MODULUS, rel=0.015)
+    low, high = made.young_modulus_ci95_pa
+    assert high / low > 1.12 and [each.name for each in made.findings] == ["slow readings"]
