@@ -23,6 +23,8 @@ USUAL_POISSON_RATIO = 0.49
 """Of silicone and soft tissue, where nothing is stated."""
 TIP_RADIUS = FileKey(low=1e-4, high=0.04, unit="m", required=True)
 """Of a rigid spherical tip that a hand or a device holds."""
+SPHERE = FileKey(str, choices=("sphere",))
+"""The tip's form, where only that is answered: models and scenes are touched by a sphere."""
 USUAL_TIP_RADIUS_M = 0.005
 MACHINE_TIP_RADIUS = FileKey(low=1e-9, high=0.1, unit="m")
 """Of a tip of any machine: an AFM's is the smallest."""

@@ -18,6 +18,7 @@ from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
 
 if TYPE_CHECKING:
     from palpate.reconstruction.checks.finding import Finding
+    from palpate.reconstruction.steps.s3_contacts.air_slope import AirSlope
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Measured:
     noise_n: standard deviation of the raw force an axis. presses: the table, forces in it as read; places and
     normals those of the touches themselves. rejected: (t, reason) of contacts not used. threshold_n: tau.
     method: 'noise' or 'paper'. dropped: corrections that were not made, and why. spans: of all contacts, None
-    for points without a time. findings: of the check-up so far, grave ones first.
+    for points without a time. findings: of the check-up so far, grave ones first. air_slope: of free air with
+    the travel, taken off; None where it shows none.
     """
 
     recording: Recording
@@ -47,3 +49,4 @@ class Measured:
     dropped: tuple[str, ...] = ()
     spans: ContactSpans | None = field(default=None, repr=False, compare=False)
     findings: tuple[Finding, ...] = ()
+    air_slope: AirSlope | None = None

@@ -189,6 +189,7 @@ def measure(recording: Recording, geometry: GeometryOptions, method: Method) -> 
             boundary=base,
             spans=samples.spans,
             unbroken=geometry.known,
+            flat=geometry.half_space or geometry.slab_m is not None,
         )
 
     if geometry.known:

@@ -33,7 +33,7 @@ from palpate.mechanics.disk.surface_files import SUFFIXES, is_surface_file
 from palpate.mechanics.errors import OptionError, SceneError
 from palpate.mechanics.model.material import BALL, Ball
 from palpate.mechanics.names import unknown
-from palpate.mechanics.plausible import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.mechanics.plausible import POISSON_RATIO, SPHERE, TIP_RADIUS, YOUNG_MODULUS
 from palpate.scenes.embedded import embedded_names, embedded_recording
 from palpate.scenes.phantoms import PHANTOMS, Region
 from palpate.scenes.regions import REST
@@ -61,7 +61,7 @@ SCHEMA: Schema = {
     },
     "part": Listed({"name": FileKey(str, required=True), "young_modulus_pa": YOUNG_MODULUS}),
     "inclusion": Listed({**BALL, "name": FileKey(str)}),
-    "tool": {"tip_radius_m": _OPTIONAL_TIP},
+    "tool": {"tip_radius_m": _OPTIONAL_TIP, "tip": SPHERE},
     "device": {
         "axes": FileKey(str),
         "motion_scale": FileKey(low=1e-3, high=1e3),

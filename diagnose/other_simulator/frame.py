@@ -105,10 +105,11 @@ def _axes(force: np.ndarray, measured: np.ndarray, sites: int) -> tuple[str, lis
     odds = np.log(prior) - 0.5 * sites * np.log(missed)  # a place's presses err alike
     share = np.exp(odds - odds.max())
     share /= share.sum()
-    best = int(np.argmax(share))
+    order = np.argsort(-share, kind="stable")
+    best = int(order[0])
     said = f"the file's fx, fy, fz are the recording's {every[best]}"
-    against = f"likeness {likeness[best]:.2f}, as written {likeness[0]:.2f}"
-    if best == 0:
+    against = f"likeness {likeness[order[int(best == 0)]]:.2f}, as written {likeness[0]:.2f}"
+    if best == 0 and share[best] > SURE:
         return AS_RECORDED, []
     if every[best] == "-x,-y,-z":
         raise OptionError(
@@ -117,7 +118,7 @@ def _axes(force: np.ndarray, measured: np.ndarray, sites: int) -> tuple[str, lis
         )
     if share[best] > SURE:
         return every[best], [f"{said} ({against}): another frame; --simulated-axes x,y,z keeps it as written"]
-    alike = [every[i] for i in np.argsort(-share, kind="stable") if share[i] > 0.1 * share[best]]
+    alike = [every[i] for i in order if share[i] > 0.1 * share[best]]
     others = "" if len(alike) < 4 else f" or {len(alike) - 3} others"
     raise OptionError(
         f"the simulated forces do not point as the measured ones do ({against}): in which axes are they? "
@@ -149,13 +150,17 @@ def _unit(ratio: float) -> tuple[str, list[str]]:
     share /= share.sum() if share.sum() > 0 else 1.0
     best = int(np.argmax(share))
     came = f"the simulated forces are {ratio:.3g} times what is expected of newtons"
-    if share[best] > SURE or not share.any():
-        if UNITS[best] == "N":
-            return "N", []
+    sure = share[best] > SURE or not share.any()
+    if sure and best:
         return UNITS[best], [
             f"{came}: read as {UNITS[best]}; --simulated-unit N keeps them (a modulus that is so far off)"
         ]
-    other = UNITS[best] if best else UNITS[int(np.argsort(share)[-2])]
+    likelihood = share / prior
+    fitting = [i for i in np.argsort(-share, kind="stable") if i and likelihood[i] > likelihood[0]]
+    if sure:
+        other = [UNITS[i] for i in fitting[:1]]
+        return "N", [f"{came}: kept, as of another modulus; --simulated-unit {u} reads {u}" for u in other]
+    either = " or ".join(UNITS[i] for i in fitting or [best])
     raise OptionError(
-        f"{came}: are they in {other}? State --simulated-unit {other}, or --simulated-unit N to keep them"
+        f"{came}: are they in {either}? State --simulated-unit {either}, or --simulated-unit N to keep them"
     )

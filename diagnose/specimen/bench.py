@@ -152,7 +152,7 @@ def _first_touches(loadings: Sequence[Loading], length: float, noise: float) -> 
     try:
         onset, error = first_touches(hand, noise / top)
     except ValueError as wrong:
-        raise ContactError("the curves have fewer than four samples on their way in") from wrong
+        raise _too_few(loadings) from wrong
     return onset / length, error / length
 
 
@@ -161,10 +161,18 @@ def _touch_of_power(each: Loading, power: float) -> tuple[float, float]:
     force is straight, and its zero is the touch."""
     over = each.push > _STRAIGHT * each.push.max()
     if over.sum() < 4:
-        raise ContactError("the curves have fewer than four samples on their way in")
+        raise _too_few([each])
     root = each.push[over] ** (1 / power)
     (slope, at_zero), covariance = np.polyfit(root, each.u[over], 1, cov=True)
     return float(at_zero), float(np.sqrt(covariance[1, 1]))
+
+
+def _too_few(loadings: Sequence[Loading]) -> ContactError:
+    in_contact = min(int((each.push > _STRAIGHT * each.push.max()).sum()) for each in loadings)
+    return ContactError(
+        f"on its way in a curve has {in_contact} readings over {100 * _STRAIGHT:g} % of its peak, and four "
+        "are needed: press slower, or read the force more often"
+    )
 
 
 def _pace(curves: Sequence[MachineCycle]) -> float:

@@ -44,7 +44,7 @@ from palpate.mechanics.model.material import (
     Skin,
 )
 from palpate.mechanics.model.model import Model, Support, Tool
-from palpate.mechanics.plausible import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from palpate.mechanics.plausible import POISSON_RATIO, SPHERE, TIP_RADIUS, YOUNG_MODULUS
 from palpate.mechanics.presses.table import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
 from palpate.mechanics.recording.segments import KINDS, TimeSegment
 from palpate.mechanics.shape.tetmesh import TetMesh
@@ -65,7 +65,7 @@ SCHEMA: Schema = {
         "skin": SKIN,
         "inclusions": Named(BALL),
     },
-    "tool": {"tip_radius_m": TIP_RADIUS},
+    "tool": {"tip_radius_m": TIP_RADIUS, "tip": SPHERE},
     "mesh": {
         "nodes": FileKey(int, low=1, high=_COUNT.high, required=True),
         "tetrahedra": _COUNT,

@@ -105,6 +105,11 @@ class Recording(Result):
         """(n,) N, length of the force."""
         return np.linalg.norm(self.force_on_tool, axis=1)
 
+    @property
+    def tip_assumed(self) -> bool:
+        """Whether the samples are another program's, and nobody said that its tip is a sphere."""
+        return "import" in self.description and "tip" not in self.description.get("tool", {})
+
     def save(self, path: Path | str) -> Path:
         """Write NAME.csv.gz (or .csv) and NAME.toml; returns the samples' path."""
         return write_recording(path, self)
@@ -197,7 +202,11 @@ def read_recording(path: Path | str) -> Recording:
     about, sensor = table.get("recording", {}), table.get("sensor", {})
     thing, tool = table.get("object", {}), table.get("tool", {})
     if tool.get("tip", "sphere") != "sphere":
-        raise RecordingError(other_tip(tool["tip"], f"'{description}': [tool] tip", str(samples)))
+        raise RecordingError(
+            other_tip(
+                tool["tip"], f"'{description}': [tool] tip", str(samples), tool.get("tip_radius_m"), own=True
+            )
+        )
     for name, part, key in (("recording", about, "force_on"), ("tool", tool, "tip_radius_m")):
         if key not in part:
             words = SCHEMA[name][key].words  # type: ignore[index, union-attr]
@@ -332,6 +341,10 @@ def description_table(recording: Recording) -> dict[str, Any]:
         table["object"]["poisson_ratio"] = recording.poisson_ratio
     if recording.base_model is not None:
         table["object"]["model"] = str(recording.base_model)
+    if "tip" in (tool := recording.description.get("tool", {})):
+        table["tool"]["tip"] = tool["tip"]
+    if recording.tip_assumed:
+        table["import"] = {}
     if recording.segments:
         table["segment"] = [dataclasses.asdict(each) for each in recording.segments]
     if recording.truth is not None:

@@ -8,12 +8,17 @@ import numpy as np
 
 from palpate.reconstruction.checks.finding import Finding
 from palpate.reconstruction.checks.samples import Samples
+from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import noise_gain
+from palpate.reconstruction.steps.s1_filter.signals import read_rate_hz
 
 _SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
 _LATE_S, _LATEST_S = 0.075, 0.25
 """A force that reads later than the first is reported, one later than the second is not corrected: presses
 keep 0.3 s of samples around them."""
+_BETWEEN, _LITTLE = 0.14, 0.005
+"""Standard error of the modulus times readings on the way in: half of what lines and cubics between them
+differ by (4.6 % at six); less than the second is not worth a word."""
 _CERTAIN = 5.0
 _ALIKE_S = 0.01
 """Touches that disagree by more about the delay are none, or drags."""
@@ -42,6 +47,43 @@ def air(data: Samples) -> Iterator[Finding]:
         np.inf,
         (float(data.recording.t[0]), float(data.recording.t[-1])),
         ("fx", "fy", "fz"),
+    )
+
+
+def slow(measured: Measured) -> Iterator[Finding]:
+    """A force that is read so slowly that what it did between two readings is part of the modulus."""
+    read_hz, presses = read_rate_hz(measured.recording), measured.presses
+    if not read_hz < measured.recording.sample_rate_hz:
+        return
+    readings = float(np.median((presses.peak_s - presses.onset_s) * read_hz))
+    error = _BETWEEN / max(readings, 1.0)
+    if error < _LITTLE:
+        return
+    yield Finding(
+        "slow readings",
+        f"the force is read at {read_hz:.3g} Hz, {readings:.2g} times from first touch to peak",
+        f"what it did between is known to {100 * error:.2g} % of the modulus, which its interval holds",
+        "read the force more often, or press slower",
+        error,
+        np.inf,
+    )
+
+
+def sloping(measured: Measured) -> Iterator[Finding]:
+    """Free air that slopes with the travel, which was taken off, with what it is known by in the interval."""
+    slope, presses = measured.air_slope, measured.presses
+    if slope is None:
+        return
+    peak = float(np.median([presses.push[part].max() for part in presses.parts]))
+    deep = float(np.median(presses.depth_m))
+    yield Finding(
+        "sloping free air",
+        f"before and after touch the force changes by {slope.n_per_m:.3g} N a metre of travel, "
+        f"{100 * abs(slope.n_per_m) * deep / peak:.2g} % of a press's peak over its depth; it is taken off",
+        f"known to {slope.error_n_per_m:.2g} N/m, alike on the way in and out",
+        "free the cable, or the spring beside the tip",
+        slope.error_n_per_m * deep / peak,
+        np.inf,
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from palpate.mechanics.errors import ContactError, FewPressesError, NoBaseError, RecordingError
 from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.recording.recording import Recording
-from palpate.reconstruction.checks.air import air, delay
+from palpate.reconstruction.checks.air import air, delay, sloping, slow
 from palpate.reconstruction.checks.channels import channels
 from palpate.reconstruction.checks.clock import clock
 from palpate.reconstruction.checks.finding import (
@@ -44,7 +44,7 @@ from palpate.reconstruction.steps.s3_contacts.quasi_static import is_points
 from palpate.reconstruction.steps.s3_contacts.sliding_presses import FLAT
 
 OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
-OF_PRESSES: tuple[Callable[[Measured], Iterator[Finding]], ...] = (support, dropped)
+OF_PRESSES: tuple[Callable[[Measured], Iterator[Finding]], ...] = (support, dropped, sloping, slow)
 OF_RESULTS: tuple[Callable[[ReconstructionOutcome], Iterator[Finding]], ...] = (outcome,)
 REFUSALS = ("no base", "no presses")
 """Findings that say where reconstruction itself stops, fault or not."""

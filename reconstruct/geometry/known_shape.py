@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.mechanics.disk.mesh_parts import words_of
 from palpate.mechanics.disk.surface_files import ClosedSurface, read_surface
 from palpate.mechanics.errors import ContactError, SurfaceError
 from palpate.mechanics.presses.table import Presses
@@ -141,6 +142,11 @@ def _placed(
     open_m = float(np.percentile(by_pose, 95))
     how = "as it stands in the device frame" if fixed else "registered to the first touches"
     notes = list(given.notes)
+    if given.parts:
+        notes.append(
+            f"{given.name} holds {words_of(given.parts)}: one modulus is fitted to them all; palpate model "
+            f"{given.name} --modulus NAME=PA states each part's own"
+        )
     if np.isfinite(found.rival_m) and found.rival_m < _ALIKE * found.rms_m:
         notes.append(
             f"another pose of {given.name} fits almost as well ({1e3 * found.rival_m:.2f} against "

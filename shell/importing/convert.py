@@ -40,7 +40,7 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     if said.tip_radius_m is None:
         raise Unclear("the tip's radius in m is in no table", "tip_radius_m", ())
     columns = find_columns(tables, said)
-    notes = _sizes(columns)
+    notes = [*said.notes, *_sizes(columns)]
     streams = {
         part: stream_of(part, [columns[r] for r in roles if r in columns], columns, tables, said, notes)
         for part, roles in PARTS.items()
@@ -93,8 +93,8 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
 
 
 def _sizes(columns: dict[str, Column]) -> list[str]:
-    """Warnings of sizes that no palpation has in the unit that nobody said; raises RecordingError for a path
-    that no arm reaches."""
+    """Warnings of sizes that no palpation has in the unit that nobody said; raises Unclear for a path that no
+    arm reaches."""
     found = []
     for kind, roles, units in (
         ("position", ("x", "y", "z"), ("mm", "um", "nm")),
@@ -110,10 +110,10 @@ def _sizes(columns: dict[str, Column]) -> list[str]:
             "force": f"the force goes up to {size:.3g} N",
         }[kind]
         likely = next((u for u in units if size * SI[kind][u] <= most), units[-1])
-        hint = f"{seen} in the unit assumed: is it {likely}? say --units {kind}={likely}"
+        hint = f"{seen} in the unit assumed: is it {likely}?"
         if kind == "position":
-            raise RecordingError(hint)
-        found.append(f"WARNING: {hint}")
+            raise Unclear(hint, "units", (f"position={likely}",))
+        found.append(f"WARNING: {hint} say --units {kind}={likely}")
     return found
 
 
@@ -155,4 +155,5 @@ def _description(said: Said, quasi_static: bool, read_hz: float | None) -> dict[
     about: dict[str, Any] = {"quasi_static": True} if quasi_static else {}
     if read_hz is not None:
         about["read_rate_hz"] = read_hz
-    return {"recording": about, "object": dict(said.thing)}
+    tool = {} if said.tip is None else {"tip": said.tip}
+    return {"recording": about, "tool": tool, "object": dict(said.thing), "import": {}}

@@ -25,6 +25,7 @@ from palpate.importing.curve_meaning import (
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import (
     MOST_ODDS,
+    Unclear,
     clock_of,
     clock_starts,
     joined,
@@ -32,7 +33,7 @@ from palpate.importing.meaning import (
 )
 from palpate.importing.side_by_side import side_by_side
 from palpate.importing.tables import Table, read_tables
-from palpate.importing.units import without_unit
+from palpate.importing.units import SI, without_unit
 from palpate.mechanics.bounds import LARGEST_N
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import EXPLORATION
@@ -179,9 +180,11 @@ def _check_sizes(raw: RawCurves) -> None:
     """Raise for lengths and loads that no machine has."""
     travelled, most = float(np.ptp(raw.position)), EXPLORATION["extent"].high
     if travelled > most:
-        raise RecordingError(
-            f"'{raw.path}': the tip travels {travelled:.4g} m, which may be {most:g} m: name "
-            "the unit, as in --units position=um"
+        likely = [f"position={unit}" for unit in ("mm", "um") if travelled * SI["position"][unit] <= most]
+        raise Unclear(
+            f"'{raw.path}': the tip travels {travelled:.4g} m, where {most:g} m is the most",
+            "units",
+            likely,
         )
     if np.abs(raw.load).max() > LARGEST_N:
         raise RecordingError(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TypeVar
 
 from palpate.importing.formats.registry import SHEET_SUFFIXES, TEXT_SUFFIXES
 from palpate.importing.formats.sheets import lines_of
@@ -12,6 +14,7 @@ from palpate.importing.formats.text import decoded
 from palpate.importing.units import SI
 from palpate.mechanics.plausible import POISSON_RATIO
 
+T = TypeVar("T")
 _HEAD_ROWS, _HEAD_BYTES = 60, 8000
 _NUMBER = r"(\d+(?:[.,]\d+)?(?:[eE][-+]?\d+)?)"
 _RADIUS = re.compile(
@@ -49,6 +52,28 @@ class Header:
     half_angle_deg: float | None = None
     poisson_ratio: float | None = None
     modulus_pa: float | None = None
+
+
+def of_tables(files: Sequence[Path], said: Mapping[str, Any]) -> dict[str, Any]:
+    """What the texts of tables state of the tip and of Poisson's ratio, where nobody said it: fields of
+    `mapping.Said`."""
+    heads = [header_of(path) for path in files]
+    found, notes = dict(said), []
+    for name, words, unit in (("tip", "form", ""), ("tip_radius_m", "radius_m", " m")):
+        stated = alike([getattr(head, words) for head in heads])
+        if found.get(name) is None and stated is not None:
+            found[name] = stated
+            notes.append(f"the tip's {words.removesuffix('_m')} is {stated}{unit}, as the file says")
+    ratio, thing = alike([head.poisson_ratio for head in heads]), dict(found.get("thing") or {})
+    if ratio is not None and "poisson_ratio" not in thing:
+        found["thing"] = {**thing, "poisson_ratio": ratio}
+    return {**found, "notes": tuple(notes)}
+
+
+def alike(values: Sequence[T | None]) -> T | None:
+    """What all files that say it say alike."""
+    said = {value for value in values if value is not None}
+    return said.pop() if len(said) == 1 else None
 
 
 def header_of(path: Path) -> Header:

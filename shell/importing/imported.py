@@ -79,7 +79,7 @@ def write_imported(
         about["read_rate_hz"] = understood.read_hz
     table = {
         "recording": about,
-        "tool": {"tip_radius_m": recording.tip_radius_m},
+        "tool": {"tip_radius_m": recording.tip_radius_m, **recording.description["tool"]},
         "object": {"name": recording.object_name, **{k: v for k, v in thing.items() if k != "name"}},
         "import": {
             "files": sources,

@@ -11,30 +11,27 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
 from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.result import MachineTests
-from palpate.diagnosis.specimen.tip_form import form_scores
 from palpate.importing.curve_meaning import SaidOfCurves
 from palpate.importing.curves import LEAST_ROWS, numbers_in, read_curves
-from palpate.importing.headers import Header, header_of
-from palpate.importing.meaning import MOST_ODDS, Unclear, best
+from palpate.importing.headers import Header, alike, header_of
+from palpate.importing.meaning import MOST_ODDS, Unclear
 from palpate.importing.tables import read_tables
+from palpate.importing.tip_form import sphere_or_ask
 from palpate.mechanics.contact.tip import POINTED, WORDS, Tip
 from palpate.mechanics.errors import OptionError, RecordingError
-from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.reconstruction.machine_curves.indentation import read_chiaro
 from palpate.reconstruction.machine_curves.uniaxial import of_compression, read_tension
-from palpate.words import listed, mm
+from palpate.words import mm
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
 _BEYOND = 1e15
 _MODULUS = ("relaxationmodulus", "modulus", "g", "e")
-T = TypeVar("T")
 
 
 def read_tests(
@@ -136,8 +133,12 @@ def _indentations(paths: list[Path], said_tip: SaidOfTip, said: SaidOfCurves) ->
         notes += read.notes
         odds.append(read.odds)
         timed = read.timed
-    poisson = _alike([h.poisson_ratio for h in heads])
-    form = said_tip.form or _form_by_curves(curves, said_tip.radius_m, poisson, odds)
+    poisson = alike([h.poisson_ratio for h in heads])
+    form = said_tip.form
+    if form is None:
+        assert said_tip.radius_m is not None
+        form = "sphere"
+        odds.append(sphere_or_ask(curves, said_tip.radius_m, poisson))
     moduli = [h.modulus_pa for h in heads if h.modulus_pa is not None]
     return MachineTests(
         "indentation",
@@ -154,13 +155,13 @@ def _indentations(paths: list[Path], said_tip: SaidOfTip, said: SaidOfCurves) ->
 def _of_files(said: SaidOfTip, heads: Sequence[Header], notes: list[str]) -> SaidOfTip:
     """The tip as it was said, else as the files' text says it. Raises Unclear where its size is in
     neither."""
-    form = said.form or _alike([h.form for h in heads])
+    form = said.form or alike([h.form for h in heads])
     if form is None and said.half_angle_deg is not None:
         raise Unclear("an angle of the tip is given, and its form is not", "tip", POINTED)
     if form is not None and said.form is None:
         notes.append(f"the tip is {WORDS[form]}, as the file says")
     if form in POINTED:
-        angle = said.half_angle_deg or _alike([h.half_angle_deg for h in heads])
+        angle = said.half_angle_deg or alike([h.half_angle_deg for h in heads])
         if angle is None:
             raise Unclear(
                 f"the half angle of {WORDS[form]}, from its axis to a flank in degrees, is in no file",
@@ -170,43 +171,12 @@ def _of_files(said: SaidOfTip, heads: Sequence[Header], notes: list[str]) -> Sai
         return SaidOfTip(Tip(form, None, angle).form, None, angle)
     radius = said.radius_m
     if radius is None:
-        radius = _alike([h.radius_m for h in heads])
+        radius = alike([h.radius_m for h in heads])
         if radius is not None:
             notes.append(f"tip radius {mm(radius, '.4g')}, as the file says")
     if radius is None:
         raise Unclear("the tip's radius in m is in no file", "tip_radius_m", ())
     return SaidOfTip(form, Tip(form or "sphere", radius).radius_m)
-
-
-def _form_by_curves(
-    curves: Sequence[MachineCycle], radius_m: float | None, poisson_ratio: float | None, odds: list[float]
-) -> str:
-    """The form that nobody said: a sphere, unless the curves speak against one: then raises Unclear."""
-    assert radius_m is not None
-    scores = form_scores(curves, radius_m, poisson_ratio or USUAL_POISSON_RATIO)
-    forms = list(scores)
-    reading = best({(k,): scores[form] for k, form in enumerate(forms)})
-    if forms[reading.value[0]] == "sphere" and reading.sure:
-        odds.append(reading.odds)
-        return "sphere"
-    other = max((f for f in forms if f != "sphere"), key=lambda f: scores[f])
-    against = float(np.exp(min(scores[other] - scores["sphere"], np.log(MOST_ODDS))))
-    named = POINTED if other == "cone" else (other,)
-    either = listed((WORDS[form] for form in named), "or")
-    weighed = f"odds against a sphere {against:.2g} to 1"
-    if against < 1:
-        weighed = f"as likely as a sphere on a machine that yields: {against:.2g} to 1"
-    raise Unclear(
-        f"the form of the tip is in no file, and the force grows as {either} gives it ({weighed})",
-        "tip",
-        (*named, "sphere"),
-    )
-
-
-def _alike(values: Sequence[T | None]) -> T | None:
-    """What all files that say it say alike."""
-    said = {value for value in values if value is not None}
-    return said.pop() if len(said) == 1 else None
 
 
 def is_chiaro(path: Path) -> bool:

@@ -47,7 +47,10 @@ _NUMBERS = {
 MAPPING: Schema = {
     "columns": dict.fromkeys(ROLES),
     "units": dict.fromkeys(SI, FileKey(str)),
-    "tool": {name: _NUMBERS[name] for name in ("tip_radius_m", "mass_kg", "flange_to_tip_m")},
+    "tool": {
+        "tip": SCHEMA["tool"]["tip"],  # type: ignore[index]
+        **{name: _NUMBERS[name] for name in ("tip_radius_m", "mass_kg", "flange_to_tip_m")},
+    },
     "sensor": {
         "force_on": FileKey(str, choices=("tool", "object")),
         "frame": FileKey(str, choices=("device", "tool")),
@@ -71,6 +74,7 @@ class Said:
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     tip_radius_m: float | None = None
+    tip: str | None = None
     mass_kg: float = 0.0
     flange_to_tip_m: Sequence[float] | None = None
     force_on: str | None = None
@@ -81,6 +85,8 @@ class Said:
     clock: str | None = None
     tare_s: tuple[float, float] | None = None
     thing: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    """Where something of it was found."""
 
     def __post_init__(self) -> None:
         """Raises RecordingError for a role, unit, frame or body that does not exist."""

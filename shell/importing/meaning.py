@@ -36,7 +36,8 @@ class Unclear(RecordingError):
         self.question, self.option, self.choices = question, option, tuple(choices)
         flag = "--" + option.removesuffix("_m").removesuffix("_deg").replace("_", "-")
         either = listed((f"{flag} {choice}" for choice in choices), "or")
-        super().__init__(f"{question}: say {either or flag + ' NUMBER'}")
+        stop = "" if question.endswith("?") else ":"
+        super().__init__(f"{question}{stop} say {either or flag + ' NUMBER'}")
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from palpate.mechanics.errors import OptionError
+from palpate.mechanics.contact.tip import other_tip
+from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.operations._call import Call
 from palpate.operations._declare import argument, operation, option
 from palpate.operations._shared import (
     SAMPLES,
     ClockOfRows,
+    TipForm,
     Units,
     columns_option,
     named,
@@ -62,6 +64,7 @@ def import_table(
     ] = None,
     units: Units = None,
     tip_radius_m: Annotated[float | None, option("radius of the tool's spherical tip", unit="m")] = None,
+    tip: TipForm = None,
     force_on: Annotated[
         str | None,
         option(
@@ -127,6 +130,7 @@ def import_table(
     missing.
     """
     from palpate.importing.convert import understand
+    from palpate.importing.headers import of_tables
     from palpate.importing.imported import Imported
     from palpate.importing.mapping import Said, read_mapping
     from palpate.importing.tables import read_tables
@@ -138,6 +142,7 @@ def import_table(
         "columns": named(columns, "columns"),
         "units": named(units, "units"),
         "tip_radius_m": tip_radius_m,
+        "tip": tip,
         "force_on": force_on,
         "frame": frame,
         "rotation": rotation,
@@ -157,7 +162,9 @@ def import_table(
         held[key] = {**held[key], **value} if merged else value
     if not files:
         raise OptionError("pp.import_table needs a file")
-    chosen = Said(**held)
+    chosen = Said(**of_tables([Path(file) for file in files], held))
+    if chosen.tip not in (None, "sphere"):
+        raise RecordingError(other_tip(str(chosen.tip), "the tip", str(files[0]), chosen.tip_radius_m))
     tables = [table for file in files for table in read_tables(file)]
     understood = understand(tables, chosen, Path(files[0]).name.split(".")[0])
     result = Imported(understood, chosen.thing, tuple(Path(file).name for file in files))

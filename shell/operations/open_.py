@@ -118,9 +118,9 @@ def open(
     _refuse_idle(kind, files[0], how)
     of_tip = {"tip": tip, "tip_angle_deg": tip_angle_deg}
     if kind != "curves":
-        _sphere_alone(tip, tip_angle_deg, files[0])
+        _sphere_alone(tip, tip_angle_deg, files[0], tip_radius_m, own=kind == "recording")
     opened = {"files": files, "save": save, **of_log, **how}
-    made = partial(_reconstructed, files, opened, how, save=save, seed=seed, progress=call.wanted)
+    made = partial(_reconstructed, files, opened, how, save=save, tip=tip, seed=seed, progress=call.wanted)
     match kind:
         case "model":
             result = _model(files)
@@ -228,6 +228,7 @@ def _reconstructed(
     odds: float | None = None,
     *,
     save: str | Path | None,
+    tip: str | None,
     seed: int,
     progress: bool | Progress,
 ) -> Opened:
@@ -245,18 +246,20 @@ def _reconstructed(
     result: Any = Checkup(recording, findings, seen, opened=opened)
     if how.get("force") or not result.grave:
         result = reconstruct(
-            recording, save=save, seed=seed, progress=progress, **{"field": "where-beaten", **how}
+            recording, save=save, tip=tip, seed=seed, progress=progress, **{"field": "where-beaten", **how}
         )
     return Opened(
         "recording", _names(files), understood, result=result, notes=notes, odds=odds or 1e6, said=opened
     )
 
 
-def _sphere_alone(tip: str | None, angle_deg: float | None, file: Any) -> None:
+def _sphere_alone(
+    tip: str | None, angle_deg: float | None, file: Any, radius_m: float | None, *, own: bool
+) -> None:
     """Raise OptionError for a tip that recordings, surfaces and models know nothing of."""
     form = tip or ("sphere" if angle_deg is None else "cone")
     if form != "sphere":
-        raise OptionError(other_tip(form, "--tip", str(file)))
+        raise OptionError(other_tip(form, "--tip", str(file), radius_m, own=own))
 
 
 def _only(files: tuple[Any, ...]) -> Any:

@@ -104,6 +104,6 @@ def recording(
     columns = dict(zip(names, np.column_stack([t, position, force]).T, strict=True))
     said = Said(
         tip_radius_m=tip_radius_m if tip_radius is None else tip_radius,
-        force_on=force_on, units=units or {}, thing=thing or {},
+        force_on=force_on, units=units or {}, thing=thing or {}, tip="sphere",
     )  # fmt: skip
     return understand([Table("arrays", columns)], said, "arrays").recording

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from palpate.operations._call import Call, report_words
 from palpate.operations._declare import operation, option
-from palpate.operations._shared import MODEL, RecordingArgument, Seed, report_option, save_option
+from palpate.operations._shared import MODEL, RecordingArgument, Seed, TipForm, report_option, save_option
 from palpate.operations.read_recording import read_recording
 from palpate.output import progress_bar
 from palpate.reconstruction.pipeline import ReconstructOptions
@@ -32,6 +32,7 @@ def reconstruct(
     save: Annotated[
         str | Path | None, save_option("folder of the model to write", "MODEL", MODEL, needed=True)
     ] = None,
+    tip: TipForm = None,
     seed: Seed = 0,
     report: Annotated[
         str | None, report_option("write the paper's figures and table, remade; PNGs into HTML's folder")
@@ -56,14 +57,19 @@ def reconstruct(
     goes; its `doubt` says why it is not reliable, '' where nothing speaks against it. Lengths m, forces
     N. Raises OptionError, ContactError, SurfaceError or MeshError.
     """
+    from palpate.importing.tip_form import ask_of_presses, with_tip
     from palpate.mechanics.model.files import read_model
     from palpate.reconstruction.pipeline import reconstruct_fully
     from palpate.render.surface.felt_surface import felt_surface
 
     for name in beside:
         read_model(name)  # before the work
+    read = read_recording(recording)
+    if tip is not None:
+        read = with_tip(read, tip)
     with call.progress("reconstruct") as show_progress:
-        made = reconstruct_fully(read_recording(recording), options, show_progress, call.out.say)
+        ask_of_presses(read, options.geometry)
+        made = reconstruct_fully(read, options, show_progress, call.out.say)
     if save is not None:
         made = dataclasses.replace(made, model=made.model.save(save))
         felt_surface(made.model, made.sites)

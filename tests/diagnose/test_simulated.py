@@ -371,6 +371,21 @@ def test_a_frame_that_the_presses_leave_open_is_asked_and_the_cure_works(world):
     assert cured.force[:, 2].max() > 0 and not cured.force[:, :2].any()
 
 
+def test_newtons_that_another_unit_would_fit_better_are_kept_and_it_is_said(world):
+    recording, model, _, force, _ = world
+    pounds = Forces(recording.t, 1.5 * force / parse_unit("lbf").scale, "x")
+    found = aligned(pounds, model.presses, OWN_CLOCK)
+    assert found.frame.unit == "N" and "--simulated-unit lbf" in str(found.frame.notes)
+
+
+def test_axes_as_written_are_asked_about_too_where_others_are_nearly_as_likely(world):
+    recording, model, _, force, _ = world
+    y_up = force[:, [0, 2, 1]] * [1, 1, -1]
+    half = Forces(recording.t, 0.35 * force + 0.65 * y_up, "x")
+    with pytest.raises(OptionError, match="x,y,z; x,z,-y fit alike"):
+        aligned(half, model.presses, OWN_CLOCK)
+
+
 @pytest.mark.parametrize("power", [2.0, 1.0])
 def test_a_force_of_another_power_of_the_depth_is_one_effect(world, power):
     force = world[3]

@@ -201,6 +201,7 @@ def test_effects_that_are_material_do_not_count_twice(tmp_path):
         ("young_modulus_pa = 16000.0", "young_modulus_pa = 'soft'", "young_modulus_pa = 'soft'.*a number"),
         ("poisson_ratio = 0.49", "poisson_ratio = 0.5", "poisson_ratio = 0.5.*from 0 to 0.4999"),
         ("poisson_ratio = 0.49", "poison_ratio = 0.49", "poisson_ratio is missing .is 'poison_ratio' meant"),
+        ("[tool]", "[tool]\ntip = 'punch'", "tip = 'punch'; it must be one of sphere"),
         ('"neo-hookean"', '"rubber"', "dent_law = 'rubber'; .* one of .*linear"),
         ("ratio_top = 0.7", "ratio_top = inf", "ratio_top = inf.*from 0.001"),
         ("thickness_m = 0.1", "thickness_m = 0", "thickness_m = 0; it must be a number from 1e-05"),

@@ -111,6 +111,15 @@ def test_one_line_for_units_open_meshes_unregistered_shapes_and_points(tmp_path,
     assert "--unit is for the file of a surface" in capsys.readouterr().err
 
 
+def test_the_parts_of_a_known_shape_are_said_with_the_one_modulus(tmp_path, ground):
+    whole, lump = trimesh.creation.box(extents=(120, 120, 30)), trimesh.creation.box(extents=(10, 10, 10))
+    trimesh.util.concatenate([whole, lump]).export(tmp_path / "organ.stl")
+    options = GeometryOptions(shape=str(tmp_path / "organ.stl"), unit="mm")
+    put = place(ground[1], options, mesh_size_m=0.01, spacing_m=0.003)
+    said = [note for note in put.notes if "432 cm³" in note and "1 cm³" in note]
+    assert len(said) == 1 and "--modulus" in said[0]
+
+
 def test_a_recording_states_its_geometry_itself():
     recording = raster((2, 2))
     object.__setattr__(recording, "description", {"object": {"slab_m": 0.03, "shape_pose": "given"}})

@@ -128,6 +128,7 @@ def machine_export(folder: Path, seed: int, rng: np.random.Generator, container:
     # words beside the numbers are in texts and sheets alone
     in_file = in_file and container in ("text", "xlsx", "ods")
     traits = {"travel": int(counts), "load": int(sign), "units": units if said else "unsaid", "air": air,
+              "answers": _answers(units, restarts, travel=counts, load=sign),
               "hold": hold, "blocks": blocks, "restarts": restarts, "name": name, **made.style}  # fmt: skip
     return Export(
         made.path, "curves", None if in_file else radius, young_modulus_pa=modulus, traits=traits,
@@ -170,11 +171,22 @@ def robot_export(folder: Path, seed: int, rng: np.random.Generator, container: s
     written = Content(head, of_each if said else None, table, [])
     made = _as(container, path, rng, written, ("t", "x", "y", "z", "fx", "fy", "fz"))
     whose = "object" if on_object else "tool"
-    traits = {"force_on": whose, "units": units if said else "unsaid", **made.style}
+    traits = {"force_on": whose, "units": units if said else "unsaid", **made.style,
+              "answers": {**_answers(units, False), "force_on": whose}}  # fmt: skip
     return Export(
         made.path, "recording", radius, position=place, force_on_tool=force, traits=traits,
         columns=made.columns, units=made.units,
     )  # fmt: skip
+
+
+def _answers(units: Mapping[str, str], restarts: bool, *, travel: int = 1, load: int = 1) -> dict[str, Any]:
+    """What the owner of a file would answer, by the option that is asked for."""
+    return {
+        "units": {"time": units["t"], "position": units["z"], "force": units["f"]},
+        "clock": "blocks" if restarts else "one",
+        "travel": "into" if travel > 0 else "out",
+        "compression": "positive" if load > 0 else "negative",
+    }
 
 
 @dataclass(frozen=True)

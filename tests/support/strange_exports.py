@@ -1,5 +1,6 @@
-"""Files and situations that nobody had tried first: tips of other forms, slow logs, words beside numbers,
-tests side by side, no time, meshes of several parts, another simulator's forces in a frame of its own."""
+"""Files and situations that nobody had tried first: tips of other forms, slow curves and robots' logs, words
+beside numbers, tests side by side, no time, meshes of several parts, another simulator's forces in a frame of
+its own."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from palpate.mechanics.contact.tip import Tip
 from palpate.mechanics.quantities import parse_unit
 from tests.support.exports import Export
 
-KINDS = ("tip", "slow", "words", "beside", "timeless", "parts", "frame")
+KINDS = ("tip", "slow", "words", "beside", "timeless", "parts", "frame", "log")
 _AXES = ("x,y,z", "x,z,-y", "x,-z,y", "y,z,x", "z,x,y", "-y,x,z", "x,y,-z", "y,x,z")
 
 
@@ -25,6 +26,8 @@ def strange_export(folder: Path, seed: int) -> Export:
         return _parts(folder, seed, rng)
     if kind == "frame":
         return _frame(folder, seed, rng)
+    if kind == "log":
+        return _log(folder, seed, rng)
     return _curves(folder, seed, rng, kind)
 
 
@@ -67,10 +70,51 @@ def _curves(folder: Path, seed: int, rng: np.random.Generator, kind: str) -> Exp
         said = {"tip": form, "tip_angle_deg": angle}
     elif stated:
         said = {"tip": form}
-    traits = {"strange": kind, "form": form, "rate": rate, "stated": stated, "tests": tests}
+    answers = {"tip": form, "tip_angle_deg": angle if pointed else None, "travel": "into"}
+    traits = {"strange": kind, "form": form, "rate": rate, "stated": stated, "tests": tests,
+              "answers": answers | {"compression": "positive", "clock": "blocks"}}  # fmt: skip
     return Export(
         path, "curves", None if said.get("tip_angle_deg") else radius, modulus, traits=traits, said=said
     )
+
+
+_NAMES = (
+    "t x y z fx fy fz",
+    "timestamp tcp_x tcp_y tcp_z ft_force_x ft_force_y ft_force_z",
+    "time ee_pose_x ee_pose_y ee_pose_z wrench_fx wrench_fy wrench_fz",
+    "t O_T_EE_12 O_T_EE_13 O_T_EE_14 O_F_ext_hat_K_0 O_F_ext_hat_K_1 O_F_ext_hat_K_2",
+)
+
+
+def _log(folder: Path, seed: int, rng: np.random.Generator) -> Export:
+    """A robot's presses of something flat and deep, at 10 to 40 Hz, with words beside; three of four by a
+    sphere."""
+    form = str(rng.choice(["sphere", "sphere", "sphere", "punch", "cone", "sphere"]))
+    radius, modulus = (
+        float(rng.choice([3e-3, 4e-3, 5e-3])),
+        float(np.exp(rng.uniform(np.log(5e3), np.log(1e5)))),
+    )
+    tip = Tip(form, half_angle_deg=45.0) if form == "cone" else Tip(form, radius)
+    rate, count, speed = float(rng.choice([10, 20, 40])), int(rng.integers(5, 10)), 5e-3
+    deep, air = radius * rng.uniform(0.4, 0.8), rng.uniform(1.5e-3, 3e-3)
+    lasts = 2 * (deep + air) / speed
+    t = np.arange(0, count * lasts, 1 / rate)
+    place, within = np.divmod(t, lasts)
+    height = speed * np.abs(within - lasts / 2) - deep
+    push = tip.force(tip.laws[0], -height, modulus, 0.49)
+    force = rng.uniform(5e-4, 3e-3) * push.max() * rng.standard_normal((len(t), 3))
+    force[:, 2] += push
+    whose, length = str(rng.choice(["tool", "object"])), str(rng.choice(["m", "mm"]))
+    position = np.column_stack([0.012 * (place // 3), 0.012 * (place % 3), height + radius])
+    table = np.column_stack([t, position / parse_unit(length).scale, force if whose == "tool" else -force])
+    head, rows = _NAMES[rng.integers(len(_NAMES))].split(), [[f"{v:.7g}" for v in row] for row in table]
+    if rng.random() < 0.5:
+        head, rows = _with_words(head, rows, rng)
+    path = folder / f"log-{seed}.csv"
+    path.write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n", encoding="utf-8")
+    answers = {"tip": form, "force_on": whose, "units": {"position": length, "time": "s", "force": "N"}}
+    traits = {"strange": "log", "form": form, "rate": rate, "count": count, "answers": answers}
+    return Export(path, "log", radius, modulus, traits=traits)
 
 
 def _with_words(
@@ -108,7 +152,10 @@ def _parts(folder: Path, seed: int, rng: np.random.Generator) -> Export:
         before += len(body.vertices)
     path = folder / f"parts-{seed}.obj"
     path.write_text("\n".join(lines) + "\n")
-    traits = {"strange": "parts", "volumes_cm3": (108.0, float(other.volume) / 1e3)}
+    inside = other.bounds[1][0] < 30
+    volumes = (108.0 - inside * float(other.volume) / 1e3, float(other.volume) / 1e3)
+    moduli = {"liver": 5e3, "tumour": 4e4}
+    traits = {"strange": "parts", "volumes_cm3": volumes, "answers": {"modulus": moduli}}
     return Export(path, "parts", None, traits=traits)
 
 
@@ -122,4 +169,9 @@ def _frame(folder: Path, seed: int, rng: np.random.Generator) -> Export:
     right = right + 0.05 * np.abs(right).max() * rng.standard_normal(right.shape)
     path = folder / f"frame-{seed}.npy"
     np.save(path, right @ turned(axes).T / parse_unit(unit).scale)
-    return Export(path, "frame", None, traits={"strange": "frame", "axes": axes, "unit": unit})
+    return Export(
+        path,
+        "frame",
+        None,
+        traits={"strange": "frame", "answers": {"simulated-axes": axes, "simulated-unit": unit}},
+    )

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from palpate.mechanics.errors import OptionError
+from palpate.mechanics.errors import ContactError, OptionError
 from palpate.mechanics.options import option
 from palpate.mechanics.presses.repeats import SITE_M
 from palpate.mechanics.presses.segmentation import FoundAround, FoundPresses, segment_recording
@@ -26,6 +26,7 @@ from palpate.reconstruction.steps.s1_filter.noise import (
 )
 from palpate.reconstruction.steps.s1_filter.signals import Signals, filtered_of, read_rate_hz
 from palpate.reconstruction.steps.s2_base import Boundary, BoundaryOptions
+from palpate.reconstruction.steps.s3_contacts.air_slope import AirSlope, air_slope, without_air_slope
 from palpate.reconstruction.steps.s3_contacts.cycles import free_air_seen
 from palpate.reconstruction.steps.s3_contacts.first_touch import (
     ContactSpans,
@@ -96,11 +97,13 @@ def explore(
     boundary: Boundary | None = None,
     spans: ContactSpans | None = None,
     unbroken: bool = False,
+    flat: bool = False,
 ) -> Measured:
     """Phases, support, base outline and palpations of a recording.
 
     boundary: a known base, for recordings without phase I. spans: of this recording at this cutoff, where
     they are known already. unbroken: contact may never break, so that it is cut at its minima (`cycles`).
+    flat: what is pressed is, so that free air may slope with the travel (`air_slope`).
     Raises ContactError where phase I is missing, nothing is touched or too few presses can be used.
     """
     options = contact_options or ContactOptions()
@@ -123,10 +126,16 @@ def explore(
     )
     tared = unbroken and not _off_the_object(recording, options, cutoff_hz)
 
+    slope: AirSlope | None = None
+
     def spans_of(read: Recording) -> ContactSpans:
+        if slope is not None:
+            return ContactSpans(without_air_slope(read, slope, cutoff_hz))
         return ContactSpans(filtered_of(read, cutoff_hz, tared=tared))
 
     if spans is None or tared:
+        spans = spans_of(recording)
+    if flat and not tared and method != "paper" and (slope := _sloping(spans, request)) is not None:
         spans = spans_of(recording)
     shifts = method != "paper" and options.correct_delay
     delay, error = 0.0, 0.0
@@ -136,7 +145,7 @@ def explore(
     found = find_first_touches(spans, request)
     step = force_delay(found.spans.filtered.signals, found.touches)
     if not shifts or not (step.certain or delay):
-        return _tabled(recording, found, method, options)
+        return _tabled(recording, found, method, options, slope=slope)
     first, before = found, (delay, error)
     for _ in range(_DELAY_ROUNDS):
         samples = round(step.seconds * recording.sample_rate_hz)
@@ -151,8 +160,16 @@ def explore(
             f"the force reads {1e3 * delay:.0f} +- {1e3 * error:.0f} ms late by first and last touch, which "
             "is less than twice its error: not corrected"
         )
-        return replace(_tabled(recording, first, method, options, before), dropped=(dropped,))
-    return _tabled(recording, found, method, options, (delay, error))
+        tabled = _tabled(recording, first, method, options, before, slope)
+        return replace(tabled, dropped=(dropped,))
+    return _tabled(recording, found, method, options, (delay, error), slope)
+
+
+def _sloping(spans: ContactSpans, request: TouchRequest) -> AirSlope | None:
+    try:
+        return air_slope(spans.filtered, find_first_touches(spans, request).touches)
+    except ContactError:
+        return None  # it may read late, which is corrected next
 
 
 def _is_far(late: Delay) -> bool:
@@ -184,10 +201,11 @@ def _tabled(
     method: str,
     options: ContactOptions,
     delay: tuple[float, float] = (0.0, 0.0),
+    slope: AirSlope | None = None,
 ) -> Measured:
     """The table of what was found; first touches carry what the delay's error moves them by.
 
-    delay: s, and its standard error.
+    delay: s, and its standard error. slope: of free air, which was taken off.
     """
     signals, contacts, (delay_s, delay_error_s) = found.spans.filtered.signals, found.touches, delay
     read_hz = read_rate_hz(recording)
@@ -233,6 +251,7 @@ def _tabled(
         delay_s=delay_s,
         delay_error_s=delay_error_s,
         spans=found.spans,
+        air_slope=slope,
     )
 
 

@@ -100,7 +100,20 @@ def _paper(result: Reconstruction, beside: dict[str, Model] | None) -> say.Story
     yield say.Section("Where this differs from the paper, and why", _differs(result))
 
 
+def _taken(result: Reconstruction) -> str:
+    """What the modulus rests on that nobody measured: Poisson's ratio and the tip, and who said them."""
+    model, recording = result.model, result.recording
+    ratio, said = model.material.poisson_ratio, recording.poisson_ratio
+    who = "as the recording says" if ratio == said else "as stated"
+    if said is None and result.model.provenance["options"].get("poisson_ratio") is None:
+        who = "assumed: --poisson-ratio sets another"
+    form = " (assumed: --tip states another form)" if recording.tip_assumed else ""
+    tip = f"a sphere of {mm(model.tool.tip_radius_m, 'g')} radius{form}"
+    return f"for Poisson's ratio {ratio:.3g} ({who}), under {tip}"
+
+
 def _meant(result: Reconstruction) -> say.Story:
+    yield say.Detail(_taken(result))
     if not result.doubt:
         yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in meaning(result).split(". "))
         yield say.Detail(meaning(result), on=say.PAGE)

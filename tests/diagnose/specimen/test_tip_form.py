@@ -10,7 +10,7 @@ from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests
 from palpate.diagnosis.specimen.tip_form import form_scores
 from palpate.mechanics.contact.tip import Tip
-from palpate.mechanics.errors import OptionError
+from palpate.mechanics.errors import ContactError, OptionError
 from palpate.show.material import lead
 
 RADIUS, MODULUS, NU = 0.005, 2e4, 0.49
@@ -86,6 +86,13 @@ def test_what_an_angle_or_a_layer_cannot_be_is_refused():
             Tip(*given)
     with pytest.raises(OptionError, match="--layer"):
         material(TIPS["punch"], curves(TIPS["punch"]), layer_m=0.02)
+
+
+def test_three_readings_in_contact_are_too_few_and_what_to_do_is_said():
+    (curve,) = curves(TIPS["cone"])
+    few = MachineCycle(curve.t[::16], curve.travel[::16], curve.force[::16], "few")
+    with pytest.raises(ContactError, match="press slower"):
+        material(TIPS["cone"], [few])
 
 
 def test_poissons_ratio_is_the_files_where_nobody_states_another():

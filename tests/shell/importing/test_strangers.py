@@ -11,7 +11,9 @@ from palpate.importing.headers import header_of
 from palpate.importing.mapping import Said, find_columns
 from palpate.importing.meaning import Unclear
 from palpate.importing.tables import Table, read_tables
+from palpate.importing.tip_form import ask_of_presses
 from palpate.mechanics.contact.tip import Tip
+from palpate.reconstruction.geometry.stated import GeometryOptions
 
 RADIUS, MODULUS = 0.005, 2e4
 G = 9.80665e-3
@@ -149,6 +151,60 @@ def test_a_headers_constants_are_used_and_shown(tmp_path):
     assert pp.material(path, poisson_ratio=0.49, progress=False).young_modulus_pa == pytest.approx(
         MODULUS, rel=0.02
     )
+
+
+LOGGED = {
+    "sphere": Tip("sphere", 0.004),
+    "punch": Tip("punch", 0.004),
+    "cone": Tip("cone", half_angle_deg=45.0),
+}
+
+
+def log(path, form: str, head: str = ""):
+    """Five presses of 3 mm into a half-space of 12 kPa, read at 20 Hz."""
+    place, within = np.divmod(np.arange(0, 5 * 2.1, 0.05), 2.1)
+    height = 2e-3 - 5e-3 * np.clip(1 - np.abs(within - 1.0), 0, 1)
+    tip, force = LOGGED[form], 5e-4 * np.random.default_rng(2).standard_normal((len(place), 3))
+    force[:, 2] += tip.force(tip.laws[0], -height, 12e3, 0.49)
+    t = 0.05 * np.arange(len(place))
+    table = np.column_stack([t, 0.012 * place, 0 * t, height + 0.004, force])
+    path.write_text(head + text([["t", "x", "y", "z", "fx", "fy", "fz"], *of_numbers(table)]))
+    return path
+
+
+@pytest.mark.parametrize("form", ["punch", pytest.param("cone", marks=pytest.mark.slow)])
+def test_a_log_whose_presses_are_no_spheres_is_asked_for_its_tip(tmp_path, form):
+    path = log(tmp_path / "log.csv", form)
+    read = pp.read_table(path, tip_radius_m=0.004)
+    assert read.tip_assumed
+    saved = pp.import_table(path, tip_radius_m=0.004).save(tmp_path / "kept.csv")
+    with pytest.raises(Unclear, match=f"--tip {form}"):
+        pp.reconstruct(saved, half_space=True, progress=False)
+    with pytest.raises(pp.PalpateError, match=f"palpate material .* --tip {form}"):
+        pp.reconstruct(read, half_space=True, tip=form, progress=False)
+    size = {"tip_radius_m": 0.004} if form == "punch" else {"tip_angle_deg": 45.0}
+    columns, units = {"t": "t", "depth": "-z", "load": "fz"}, {"position": "m"}
+    cured = pp.material(path, tip=form, columns=columns, units=units, progress=False, **size)
+    assert cured.young_modulus_pa == pytest.approx(12e3, rel=0.03)
+
+
+def test_a_log_of_a_sphere_is_not_asked_and_one_that_is_stated_neither(tmp_path):
+    flat = GeometryOptions(half_space=True)
+    ask_of_presses(pp.read_table(log(tmp_path / "log.csv", "sphere"), tip_radius_m=0.004), flat)
+    stated = pp.read_table(log(tmp_path / "punch.csv", "punch"), tip_radius_m=0.004, tip="sphere")
+    assert not stated.tip_assumed
+    ask_of_presses(stated, flat)
+
+
+def test_what_a_logs_own_text_says_of_the_tip_counts(tmp_path):
+    round_tip = "# probe: spherical, radius 4 mm\n# Poisson's ratio: 0.45\n"
+    found = pp.import_table(log(tmp_path / "log.csv", "sphere", round_tip))
+    read = found.recording
+    assert (read.tip_radius_m, read.poisson_ratio, read.tip_assumed) == (0.004, 0.45, False)
+    kept = pp.read_recording(found.save(tmp_path / "kept.csv"))
+    assert (kept.tip_radius_m, kept.poisson_ratio, kept.tip_assumed) == (0.004, 0.45, False)
+    with pytest.raises(pp.PalpateError, match="palpate material .* --tip punch"):
+        pp.import_table(log(tmp_path / "log.csv", "punch", "# probe: flat punch, radius 4 mm\n"))
 
 
 def test_a_recording_is_pressed_by_a_sphere_alone(tmp_path):
