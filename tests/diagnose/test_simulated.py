@@ -142,7 +142,7 @@ def test_a_simulator_that_is_off_already_is_judged_against_its_best(world):
     assert shares(result) == pytest.approx(1.0)
     (pair,) = result.made_up
     assert set(pair.effects) == {"contact_stiffness", "its own"} and pair.together_n < max(pair.alone_n)
-    assert "make up for each other" in str(result)
+    assert "make up for each other" in "\n".join(result.lines())
     unchanged = judged_against(base, 1.5 * law)
     assert unchanged.effects == () and unchanged.made_up == ()
 

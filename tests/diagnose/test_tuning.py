@@ -162,6 +162,11 @@ def test_the_certificate_is_of_what_was_not_tuned_on(springs):
     assert isinstance(found, pp.Tuned) and "does not carry over to soft" in str(found)
 
 
+def said(found):
+    import_module("palpate.show")  # a result says itself once that is there
+    return "\n".join(found.lines())
+
+
 class Ticking(Springs):
     """Each of its steps takes 10 ms of a clock that starts at 0; ends_at: s, when Ctrl-C comes."""
 
@@ -200,7 +205,7 @@ def test_the_time_is_kept_with_the_judgement_in_it(ticking, within_s):
     found = ticking(within_s)
     assert Ticking.clock_s <= within_s + 0.2 and found.seconds <= within_s + 0.2
     assert all(math.isnan(s.gap_after_n) == (s.name in found.undone) for s in found.unseen)
-    assert all(name in str(found) for name in found.undone)
+    assert all(name in said(found) for name in found.undone)
     if within_s >= 20.0:
         assert found.undone == () and found.moved and found.gap_after_n < 0.2 * found.gap_before_n
     if within_s <= 3.0:
@@ -215,11 +220,29 @@ def test_what_was_found_until_ctrl_c_is_kept_and_what_is_lacking_said(ticking, t
         Ticking.clock_s = 0.0
         found = ticking(20.0, ends_at)
         assert found.interrupted is not None and lost <= {*found.undone}
-        assert found.fitted_after_n < found.fitted_before_n and "interrupted" in str(found)
+        assert found.fitted_after_n < found.fitted_before_n and "interrupted" in said(found)
         assert found.as_json()["interrupted"]
         written = replace(found, simulator="scikit-fem", began={}, settings=found.settings)
         assert "n_per_m" in written.save(tmp_path / "x.py").read_text()
     assert whole.interrupted is None
+
+
+@pytest.mark.slow
+def test_ctrl_c_writes_the_file_before_it_ends_the_program(ticking, bench, tmp_path, monkeypatch):
+    """Called from Python: the command says all, writes, and then ends as any that is interrupted."""
+    recording, model = bench.record(law="linear")
+    file = tmp_path / "settings.xml"
+    how = {"renderer": "mujoco", "save": file, "diagnosed": False, "shapes": False, "progress": False}
+
+    def tuned_until(*args, **more):
+        Ticking.ends_at = Ticking.clock_s + 0.1
+        return tuned(*args, **more)
+
+    monkeypatch.setattr("palpate.diagnosis.other_simulator.tuned.tuned", tuned_until)
+    monkeypatch.setattr("palpate.exporting.settings.write_settings", lambda path, found: path.write_text("x"))
+    with pytest.raises(KeyboardInterrupt):
+        pp.tune(recording, model, **how)
+    assert file.read_text() == "x"
 
 
 def test_what_only_another_modulus_would_hide_is_said(springs):
