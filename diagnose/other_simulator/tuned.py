@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -135,11 +135,20 @@ class _Pressed:
         self.runs, self.parts = runs, {**held, **{path.name: [path] for path in judged.unseen}}
         self.interrupted: KeyboardInterrupt | None = None
 
-    def off(self, values: Values, when: str, progress: Progress) -> dict[str, Sums]:
-        """By name, of those that were pressed to their end."""
+    def off(
+        self,
+        values: Values,
+        when: str,
+        progress: Progress,
+        fits: Callable[[str], bool] = lambda name: True,
+    ) -> dict[str, Sums]:
+        """By name, of those that were pressed to their end; fits(name): whether one is begun at all, as a
+        solver that factorises hears of no time."""
         sums: dict[str, Sums] = {}
         try:
             for name, paths in self.parts.items():
+                if not fits(name):
+                    continue
                 sums[name] = off(self.runs, values, paths, _named(progress, f"{name} {when}"))
         except TimeIsUp:
             pass
@@ -205,7 +214,12 @@ def tuned(
     after: dict[str, Sums] = before if best.values == start else {}
     if not interrupted and best.values != start:
         pressed.parts = {name: pressed.parts[name] for name in before}
-        after = pressed.off(best.values, "after", by_clock)
+        slower = max(1.0, best.path_s / was.path_s) if was.path_s else 1.0
+
+        def fits(name: str) -> bool:
+            return clock() + slower * before[name].took_s <= begun + within_s
+
+        after = pressed.off(best.values, "after", by_clock, fits)
     interrupted = interrupted or pressed.interrupted
     lost = [name for name in _Pressed(runs, judged).parts if name not in after]
     given = adapter.stated["young_modulus_pa"]

@@ -170,7 +170,11 @@ def said(found):
 class Ticking(Springs):
     """Each of its steps takes 10 ms of a clock that starts at 0; ends_at: s, when Ctrl-C comes."""
 
-    clock_s, ends_at = 0.0, math.inf
+    clock_s, ends_at, begins_s = 0.0, math.inf, 0.0
+
+    def begin(self, tip, radius_m):
+        type(self).clock_s += self.begins_s * (100.0 if self.own.n_per_m > 250.0 else 1.0)
+        return super().begin(tip, radius_m)
 
     def step(self, dt_s, tip):
         type(self).clock_s += 0.01
@@ -210,6 +214,16 @@ def test_the_time_is_kept_with_the_judgement_in_it(ticking, within_s):
         assert found.undone == () and found.moved and found.gap_after_n < 0.2 * found.gap_before_n
     if within_s <= 3.0:
         assert "two" in found.undone
+
+
+def test_a_solver_that_hears_of_no_time_is_not_begun_late(ticking, monkeypatch):
+    """What is nearest takes a second to begin, of which nobody is told; and trials left no time for it."""
+    monkeypatch.setattr(Ticking, "begins_s", 0.01)
+    monkeypatch.setattr("palpate.diagnosis.other_simulator.tuning.MARGIN", 0.5)
+    for within_s in (9.0, 10.0, 11.0, 12.0, 13.0, 14.0):
+        Ticking.clock_s = 0.0
+        ticking(within_s)
+        assert Ticking.clock_s <= within_s + 0.2
 
 
 def test_what_was_found_until_ctrl_c_is_kept_and_what_is_lacking_said(ticking, tmp_path):
