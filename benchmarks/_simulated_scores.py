@@ -2,7 +2,7 @@
 
 A row is a case: "truth" what was planted, "sizes_n" N rms by which each flaw changes the force, "named" and
 "candidates" of numerics and parameters. "right": by flaw the names that say it, where that is not its own
-name. "own": names that the same simulator gets with nothing planted.
+name. "own": names that the same simulator gets with nothing planted, against which it is judged.
 """
 
 from __future__ import annotations
@@ -50,15 +50,9 @@ def right_of(row: dict[str, Any], flaw: str) -> set[str]:
     return set(row.get("right", {}).get(flaw, [flaw]))
 
 
-def new_in(row: dict[str, Any]) -> list[str]:
-    """What is named, without what the simulator has of its own and no planted flaw would be called."""
-    planted = set().union(*(right_of(row, flaw) for flaw in truth_of(row)))
-    return [n for n in row["named"] if n in planted or n not in row.get("own", [])]
-
-
 def _strictly(row: dict[str, Any]) -> bool:
     """Whether the largest flaw is named first."""
-    return bool({*new_in(row)[:1]} & right_of(row, truth_of(row)[0]))
+    return bool({*row["named"][:1]} & right_of(row, truth_of(row)[0]))
 
 
 def _first(row: dict[str, Any]) -> bool:
@@ -74,7 +68,7 @@ def _all_of(row: dict[str, Any]) -> bool:
 
 def _only(row: dict[str, Any]) -> bool:
     """Whether nothing else is named."""
-    return _strictly(row) and set(new_in(row)) <= right_of(row, truth_of(row)[0])
+    return _strictly(row) and set(row["named"]) <= right_of(row, truth_of(row)[0])
 
 
 def figures_of(rows: Sequence[dict[str, Any]], of: str = "") -> list[Figure]:

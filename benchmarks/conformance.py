@@ -1,8 +1,10 @@
 """The conformance kit: its truth beside the virtual laboratory, its flaws' scores, and simulators' scores.
 
 The laboratory is another code with another mesh: it presses the same bodies by the same depths at small
-strains, its tip sticking. Told is its force over the shipped one of that law, and how much of the bound that
-is. Forces of simulators are those that the kit's adapters wrote, each in a folder of its name.
+strains, its tip sticking, and then moves it sideways as far as the shipped solution does, from which the
+slides are made (`truth`). Told is its force over the shipped one of that law, and how much of the bound that
+is; sideways against the share of the force that the bound holds for slides. Forces of simulators are those
+that the kit's adapters wrote, each in a folder of its name.
 """
 
 from __future__ import annotations
@@ -23,7 +25,16 @@ from benchmarks._known_shapes import SHAPES
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.output import progress_bar
-from palpate.scenes.conformance.cases import BODIES, POISSON, SHARES, TIP_M, YOUNG_PA, Body
+from palpate.scenes.conformance.cases import (
+    BODIES,
+    POISSON,
+    SHARES,
+    SLIP_SHARE,
+    STUCK,
+    TIP_M,
+    YOUNG_PA,
+    Body,
+)
 from palpate.scenes.conformance.flaws import FLAWS
 from palpate.scenes.conformance.kit import write_kit
 from palpate.scenes.conformance.truth import alone
@@ -103,10 +114,14 @@ def scorer(kit: Path) -> Callable[[Path], dict[str, Any]]:
 def beside_laboratory(bodies: list[Body]) -> list[Figure]:
     """The laboratory's force over the shipped one of its law, and the difference over the bound."""
     progress, rows, figures = progress_bar("laboratory"), [], []
+    heads = ["body", *(f"{x:g} of the depth" for x in SHARES), "over the bound", "sideways", "CPU s"]
     for done, body in enumerate(bodies):
         began = time.process_time()
-        other = in_laboratory(body)
+        whole = in_laboratory(body)
         spent = time.process_time() - began
+        other, along = whole[:-1], body.solved.along
+        held, shipped = (float(f[-1] @ along - f[-2] @ along) for f in (whole, body.solved.force[0]))
+        aside = held / shipped - 1
         own, tip = body.solved.force[0, : len(SHARES)], alone(body)
         over = np.einsum("ki,ki->k", other, own) / np.einsum("ki,ki->k", own, own) - 1
         bound = np.array(
@@ -117,22 +132,33 @@ def beside_laboratory(bodies: list[Body]) -> list[Figure]:
         )
         share = np.linalg.norm(other - own, axis=1) / bound
         worst = 100 * float(np.abs(over).max())
-        rows.append([body.name, *(f"{100 * x:+.2f} %" for x in over), f"{share.max():.2f}", f"{spent:.0f}"])
+        rows.append(
+            [
+                body.name,
+                *(f"{100 * x:+.2f} %" for x in over),
+                f"{share.max():.2f}",
+                f"{100 * aside:+.2f} %",
+                f"{spent:.0f}",
+            ]
+        )
         figures.append(
             Figure(f"{body.name}: worst of {len(over)} depths over the laboratory", worst, unit="%")
         )
         figures.append(
             Figure(f"{body.name}: that difference over the bound", float(share.max())).at_most(1.0)
         )
+        sideways = Figure(f"{body.name}: force sideways over the laboratory", 100 * abs(aside), unit="%")
+        figures.append(sideways.at_most(100 * SLIP_SHARE))
         progress("laboratory", (done + 1) / len(bodies))
     progress.close()
     if rows:
-        print(table(["body", *(f"{x:g} of the depth" for x in SHARES), "over the bound", "CPU s"], rows))
+        print(table(heads, rows))
     return figures
 
 
 def in_laboratory(body: Body) -> np.ndarray:
-    """(depths, 3) N on a tip that sticks, small strains, at SHARES of the body's depth."""
+    """(depths + 1, 3) N on a tip that sticks, small strains, at SHARES of the body's depth, then STUCK of it
+    along."""
     if body.name == "slab":
         vertices, faces = stacked(rectangle(0.16, 0.16), column(0.08, 0.008))
     else:
@@ -150,4 +176,7 @@ def in_laboratory(body: Body) -> np.ndarray:
             state = problem.advance(state, at + (radius - part) * solved.normal)
         depth = 1e3 * share * body.depth_m
         force.append(1e-6 * YOUNG_PA * state.force)
+    for slid in np.linspace(0, STUCK * depth, 3)[1:]:
+        state = problem.advance(state, at + (radius - depth) * solved.normal + slid * solved.along)
+    force.append(1e-6 * YOUNG_PA * state.force)
     return np.array(force)

@@ -10,12 +10,11 @@ Shrinkage: the gap that was said to be left once that flaw is mended, against th
 without it.
 
 --adapter NAME plants them in another simulator instead (`_adapter_flaws`): its settings made worse, its
-parameters wrong, over a control that is as resolved as can be afforded. A flaw is said by any name whose
-advice mends the setting that was changed (an element's size: mesh stiffness or contact nodes). What the
-control is named for is the simulator's own: it counts as a false alarm where the control's force is within
-5 % of our law (rms), or where a parameter is named; else it is true, and is left out of what is asked of the
-planted ones, unless a planted one is called the same. Shrinkage is then not asked: what is said is the gap
-without any of that flaw, and the control has some of it.
+parameters wrong, over a control that is as resolved as can be afforded, and judged against that control
+(`diagnose --baseline`). A flaw is said by any name whose advice mends the setting that was changed (an
+element's size: mesh stiffness or contact nodes). What the control is named for is the simulator's own: it
+counts as a false alarm where the control's force is within 5 % of our law (rms), or where a parameter is
+named.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ from benchmarks.timing import table
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions
 from palpate.diagnosis.other_simulator.declared_parameters import KEYS, Stated
 from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions
-from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
+from palpate.diagnosis.other_simulator.pipeline import Asked, Base, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import SimulatedGap
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import Diagnosis
@@ -150,7 +149,6 @@ def _run_adapter(
     rng = np.random.default_rng(arguments.seed)
     parameters = Parameters(runs.block)
     plan = drawn_plan(adapter, rng, arguments.singles, arguments.pairs, parameters)
-    own: list[str] = []
     gaps: dict[str, float] = {}
     cases = [((), k) for k in range(max(arguments.controls, 1))] + [(p, 0) for p in plan]
     with progress_bar("cases") as tell:
@@ -158,10 +156,8 @@ def _run_adapter(
             tell("cases", number / len(cases))
             name = f"{adapter}-{arguments.seed}-{number}"
             if name not in rows:
-                rows[name] = _adapter_row(runs, adapter, worlds(k), planted, own, gaps)
+                rows[name] = _adapter_row(runs, adapter, worlds(k), planted, gaps)
                 _keep(work, name, rows[name])
-            if number == 0:
-                own = rows[name]["named"]
             if k == 0:
                 gaps[_key(planted)] = rows[name]["gap_n"]
     return _said(list(rows.values()), f"{adapter}: ")
@@ -176,7 +172,6 @@ def _adapter_row(
     adapter: str,
     world: _Reality,
     planted: Sequence[tuple[AdapterFlaw, dict[str, float]]],
-    own: list[str],
     gaps: dict[str, float],
 ) -> dict[str, Any]:
     """Run, seal, judge one case. gaps: N by `_key`, of what was judged in the same world before."""
@@ -201,11 +196,12 @@ def _adapter_row(
     truth = {"flaws": [[flaw.name, *change.values()] for flaw, change in planted]}
     salt = secrets.token_hex(16)
     sealed = digest(truth, salt)
-    verdict = _verdict(world, Forces(runs.block.t, whole, adapter), simulation.stated)
+    base = Base(Forces(runs.block.t, control, adapter), CONTROLS[adapter].stated) if planted else None
+    verdict = _verdict(world, Forces(runs.block.t, whole, adapter), simulation.stated, base)
     named = _named(verdict)
     off = rms(control - runs.law) / rms(runs.law)
     right = {flaw.name: list(flaw.right) for flaw, _ in planted}
-    at = [n for n in named if n in right.get(largest, []) and not {*own} & {*right[largest]}]
+    at = [n for n in named if n in right.get(largest, [])]
     known = {e.name: e.gap_after_n for e in verdict.entries}
     limits = {e.name: e.detectable_n for e in verdict.entries if np.isfinite(e.detectable_n)}
     seen = [limits[n] for n in right.get(largest, []) if n in limits]
@@ -214,7 +210,8 @@ def _adapter_row(
     wrongly = set(named) if off < ALIKE else set(verdict.parts["parameters"].names)
     return {
         "truth": truth, "salt": salt, "sealed": sealed, "late_sensor": world.late, "sizes_n": sizes,
-        "right": right, "own": own, "own_share": off, "named": named,
+        "right": right, "own": [*verdict.own.effects] if verdict.own else [], "own_share": off,
+        "made_up": [each.as_json() for each in verdict.made_up], "named": named,
         "times_visible": sizes[largest] / least if largest else 0.0,
         "left_n": gaps.get(rest, verdict.gap_before_n), "kind": verdict.kind,
         "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),
@@ -303,10 +300,10 @@ def _judged(
     return _Case(number, tuple(planted), sizes, left, sealed, salt, verdict, world.late)
 
 
-def _verdict(world: _Reality, forces: Forces, stated: Stated) -> SimulatedGap:
-    """What is said, of nothing but the forces and what the simulation was given."""
+def _verdict(world: _Reality, forces: Forces, stated: Stated, base: Base | None = None) -> SimulatedGap:
+    """What is said, of nothing but the forces and what the simulation was given; and of its base."""
     return diagnose_simulated(
-        world.recording, world.model, Asked(forces, stated, ForcesOptions(clock_offset_s=0.0)),
+        world.recording, world.model, Asked(forces, stated, ForcesOptions(clock_offset_s=0.0), base),
         DiagnoseOptions(bootstrap=100), reality=world.diagnosis, attribution=AttributionOptions(most=2),
     )  # fmt: skip
 

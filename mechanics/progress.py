@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 Progress = Callable[[str, float], None]
 """`progress(stage, fraction)`: the stage's name in plain words and the share of it done, 0 to 1."""
 
+Clocked = Callable[[], float]
+"""A clock, s."""
+
 
 def silent(stage: str, fraction: float) -> None:
     """The default: reports to nobody."""
@@ -21,6 +24,25 @@ def unsaid(words: str) -> None:
 def part(progress: Progress, low: float, high: float) -> Progress:
     """The progress of a part of the work, from `low` to `high` of the whole."""
     return lambda stage, fraction: progress(stage, low + (high - low) * fraction)
+
+
+class TimeIsUp(Exception):
+    """The time that was given is over."""
+
+
+def until(
+    progress: Progress, begun_s: float, within_s: float, share: float = 1.0, now: Clocked = time.monotonic
+) -> Progress:
+    """The same by the clock: the share that is done is that of the time, within_s from begun_s on, and once
+    that share of it has passed TimeIsUp is raised."""
+
+    def told(stage: str, fraction: float) -> None:
+        passed = (now() - begun_s) / within_s
+        if passed > share:
+            raise TimeIsUp
+        progress(stage, passed)
+
+    return told
 
 
 class Clock:

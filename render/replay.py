@@ -39,6 +39,7 @@ def replay(
     progress: Progress = silent,
     unsettled: Callable[[int], None] | None = None,
     checked: bool = True,
+    chunk: int = _CHUNK,
 ) -> np.ndarray:
     """Force on the tool (n, 3) N for a path of one tip: t (n,) s increasing, positions (n, 3) m of its
     centre.
@@ -47,6 +48,7 @@ def replay(
     model's. unsettled: told how many samples' force did not settle, and hold the one before. Bit-identical
     from run to run. Raises OptionError where the shapes disagree, and, if checked, where the path starts in
     the object: a tip that does feels nothing until it has come out.
+    chunk: samples after each of which progress is told.
     """
     scene = scene_of(touched)
     t = np.ascontiguousarray(t, dtype=float)
@@ -59,10 +61,10 @@ def replay(
     forces = np.zeros_like(positions)
     state = scene.start([radius])
     steps = np.diff(t, prepend=t[0] - 1e-3) if len(t) else t
-    for first in range(0, len(t), _CHUNK):
-        part = slice(first, first + _CHUNK)
+    for first in range(0, len(t), chunk):
+        part = slice(first, first + chunk)
         forces[part] = scene.follow(state, positions[part, None], steps[part])[:, 0]
-        progress("replay", min(first + _CHUNK, len(t)) / len(t))
+        progress("replay", min(first + chunk, len(t)) / len(t))
     if unsettled is not None:
         unsettled(int(state.touch.unsettled[0]))
     return forces

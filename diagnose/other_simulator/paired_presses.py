@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from palpate.diagnosis.other_simulator.gap_decomposition import law_at
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.mechanics.presses.table import MARGIN_S, Presses
 from palpate.mechanics.progress import Progress
+
+if TYPE_CHECKING:
+    from palpate.diagnosis.other_simulator.own_flaws import Own
 
 
 @dataclasses.dataclass
@@ -60,7 +65,28 @@ def pair_forces(given: Aligned, findings: Findings, stated: Stated) -> Sides:
     return Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes, given.frame)
 
 
-def named_numerics(sides: Sides, rules: AttributionOptions, progress: Progress) -> Numerics:
+def named_numerics(
+    sides: Sides, rules: AttributionOptions, progress: Progress, own: Own | None = None
+) -> Numerics:
+    """What is named against the law; beside what the simulator has of its own, where that is known, which
+    goes into the force of all together."""
+    if own is None:
+        return _named(sides, rules, progress)
+    added = own.force(sides.forward.stated)
+    found = _named(_without(sides, added), rules, progress)
+    return dataclasses.replace(found, force={**found.force, "all": found.force["all"] + added})
+
+
+def _without(sides: Sides, added: np.ndarray) -> Sides:
+    """The same less a force, (n, 3) N, local."""
+    forward = copy.copy(sides.forward)
+    t = forward.touches
+    taken = np.einsum("nij,ni->nj", t.frame[t.press], added)
+    forward.touches = dataclasses.replace(t, force=t.force - taken)
+    return dataclasses.replace(sides, forward=forward, raw=sides.raw - added)
+
+
+def _named(sides: Sides, rules: AttributionOptions, progress: Progress) -> Numerics:
     """What is named against the law. Presses that the tip fell through have a say until they did, where that
     is long enough, and get the law's force with what was named from there on."""
     forward, t = sides.forward, sides.forward.touches

@@ -26,6 +26,7 @@ from palpate.diagnosis.other_simulator.gap_decomposition import (
     sizes_alone,
     wrong_parameters,
 )
+from palpate.diagnosis.other_simulator.own_flaws import Own, made_up, own_of, with_same_presses
 from palpate.diagnosis.other_simulator.paired_presses import Sides, named_numerics, pair_forces
 from palpate.diagnosis.other_simulator.result import Part, SimulatedGap, Simulator, advice_of
 from palpate.diagnosis.pipeline import diagnose
@@ -44,13 +45,23 @@ OWN_MODULUS = "stated_modulus"
 
 
 @dataclasses.dataclass(frozen=True)
+class Base:
+    """The same simulator's forces at its best settings along the same path, and what it was given there."""
+
+    forces: Forces
+    stated: Stated
+
+
+@dataclasses.dataclass(frozen=True)
 class Asked:
-    """What is asked of a simulation: its forces, what it was given, how the file is meant; of one run
+    """What is asked of a simulation: its forces, what it was given, how the file is meant, the base that it
+    is judged against; of one run
     here its version, advice by numerical effect, settings in words, and greatest Poisson's ratio."""
 
     forces: Forces
     stated: Stated
     options: ForcesOptions = dataclasses.field(default_factory=ForcesOptions)
+    base: Base | None = None
     version: str = ""
     advice: dict[str, str] = dataclasses.field(default_factory=dict)
     run_as: str = ""
@@ -86,16 +97,23 @@ def diagnose_simulated(
             recording, model, options, part(progress, 0.0, 0.6), nuisance=nuisance, attribution=attribution
         )
     findings: Findings = reality.findings
+    own, base = None, asked.base
+    if base is not None:
+        level = base.stated.young_modulus_pa / model.material.young_modulus_pa
+        best = aligned(base.forces, presses, asked.options, level)
+        given, best = with_same_presses(given, best)
+        own = own_of(pair_forces(best, findings, base.stated), rules, part(progress, 0.6, 0.75))
     sides = pair_forces(given, findings, asked.stated)
-    numerics = named_numerics(sides, rules, part(progress, 0.6, 0.95))
-    result = _concluded(_weighed(asked, options, rules, reality, sides, numerics))
+    numerics = named_numerics(sides, rules, part(progress, 0.75, 0.95), own)
+    result = _concluded(_weighed(asked, options, rules, reality, sides, numerics), own)
     progress("done", 1.0)
     return result
 
 
 @dataclasses.dataclass(frozen=True)
 class _Weighed:
-    """What an answer is made of. gaps: (n, 3) N, local, as the parts are taken off, by name."""
+    """What an answer is made of. gaps: (n, 3) N, local, as the parts are taken off, by name.
+    least_n: N, what is said of a force at least."""
 
     asked: Asked
     seed: int
@@ -109,6 +127,7 @@ class _Weighed:
     measured: Stated
     weighing: GapSums
     gaps: dict[str, np.ndarray]
+    least_n: float
 
     def square(self, name: str) -> float:
         """N^2, the mean square of a gap."""
@@ -145,11 +164,11 @@ def _weighed(
         real = dataclasses.replace(real, names=())  # true of the object, and no part of this gap
     return _Weighed(
         asked, options.seed, options.bootstrap, rules.doubt, reality, sides, numerics, real, wrong, measured,
-        weighing, gaps,
+        weighing, gaps, rules.smallest * reality.noise_n,
     )  # fmt: skip
 
 
-def _concluded(w: _Weighed) -> SimulatedGap:
+def _concluded(w: _Weighed, own: Own | None) -> SimulatedGap:
     reality, numerics, weighing = w.reality, w.numerics, w.weighing
     findings: Findings = reality.findings
     whole = w.square("simulated")
@@ -210,6 +229,8 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         touches=forward.touches,
         gaps=w.gaps,
         simulated=w.sides.raw,
+        own=None if own is None else own.at(w.asked.stated, w.weighing),
+        made_up=made_up(w.numerics, w.wrong, own, w.asked.stated, w.weighing, w.least_n),
     )  # fmt: skip
 
 

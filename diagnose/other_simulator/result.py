@@ -129,6 +129,37 @@ class Mended:
         return {"settings": self.settings, "gap_n": self.gap_n, "effects": list(self.effects)}
 
 
+@dataclass(frozen=True)
+class OwnFlaws:
+    """What a simulator has of its own at its best settings: names, what else it may be, and N rms off our
+    law."""
+
+    effects: tuple[str, ...]
+    candidates: tuple[str, ...]
+    off_n: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Its fields."""
+        return {"effects": list(self.effects), "candidates": list(self.candidates), "off_n": self.off_n}
+
+
+@dataclass(frozen=True)
+class MadeUp:
+    """Two errors that make up for each other: N rms that each alone and both together change the force by."""
+
+    effects: tuple[str, str]
+    alone_n: tuple[float, float]
+    together_n: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Its fields."""
+        return {
+            "effects": list(self.effects),
+            "alone_n": list(self.alone_n),
+            "together_n": self.together_n,
+        }
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SimulatedGap(Result):
     """Where, why and how far another simulator's force leaves the measured one. Gaps: N, rms of the 3-vector
@@ -139,7 +170,9 @@ class SimulatedGap(Result):
     noise_share is the sensor's noise and touch_share what the object's own first touches take. effects: what
     changes the force most first. reality: today's diagnosis of our ideal model. gaps: (n, 3) N, local frames
     of `touches`, as the parts are taken off, "simulated" first. notes: what was told of the forces. mended:
-    where it was run again. `plot`: the parts as shares. `show`: the object coloured by the gap.
+    where it was run again. own: what it has of its own at its best settings, where that was given; made_up:
+    pairs of errors of which one hides the other. `plot`: the parts as shares. `show`: the object coloured by
+    the gap.
     """
 
     simulator: Simulator
@@ -168,6 +201,8 @@ class SimulatedGap(Result):
     gaps: Mapping[str, np.ndarray] = field(default_factory=dict)
     simulated: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     mended: Mended | None = None
+    own: OwnFlaws | None = None
+    made_up: tuple[MadeUp, ...] = ()
 
     @property
     def without_numerics_n(self) -> float:
@@ -189,5 +224,7 @@ class SimulatedGap(Result):
             "gap_after_measured_n": None if self.mended is None else self.mended.gap_n,
             "gap_without_numerics_n": self.without_numerics_n,
             "mended": None if self.mended is None else self.mended.as_json(),
+            "own": None if self.own is None else self.own.as_json(),
+            "made_up": [each.as_json() for each in self.made_up],
             "ideal": self.reality.as_json(),
         }

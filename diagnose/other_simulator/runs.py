@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -13,13 +14,15 @@ import numpy as np
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.progress import silent
+from palpate.mechanics.progress import Clocked, Progress, silent
 from palpate.mechanics.recording.recording import Recording
 from palpate.render.options import RenderOptions
 from palpate.render.registry import create
 from palpate.render.replay import replay, rows_of_touch
 from palpate.render.simulators.base import over
 
+TOLD = 10
+"""Samples after each of which progress is told: where the time is over, a run ends there."""
 Values = Mapping[str, float]
 """Settings of a simulator by name."""
 
@@ -55,7 +58,7 @@ def path_of_press(recording: Recording, model: Model, presses: Presses, number: 
 class Sums:
     """Over samples: missed N^2, sum of |simulated - true|^2; cross, own, true N^2, sums of simulated . true,
     |simulated|^2, |true|^2; spent_s of the processor in steps of simulated_s in contact. ended: why a path
-    ended without a force, which then counts as none."""
+    ended without a force, which then counts as none. took_s: all of it, by the clock."""
 
     missed: float = 0.0
     cross: float = 0.0
@@ -65,6 +68,7 @@ class Sums:
     spent_s: float = 0.0
     simulated_s: float = 0.0
     ended: tuple[str, ...] = ()
+    took_s: float = 0.0
 
     def __add__(self, other: Sums) -> Sums:
         return Sums(*(getattr(self, f.name) + getattr(other, f.name) for f in dataclasses.fields(self)))
@@ -97,15 +101,17 @@ def _cost(made: Any) -> np.ndarray:
 
 
 class Runs:
-    """A simulator at its `options`, some of whose settings are given anew for each run."""
+    """A simulator at its `options`, some of whose settings are given anew for each run; what was run is kept.
+    now: the clock, s."""
 
-    def __init__(self, name: str, options: RenderOptions) -> None:
-        self.name, self.options = name, options
+    def __init__(self, name: str, options: RenderOptions, now: Clocked = time.monotonic) -> None:
+        self.name, self.options, self.now = name, options, now
         self._made: dict[tuple[Any, ...], Any] = {}
+        self._ran: dict[tuple[Any, ...], tuple[TruePath, Sums, np.ndarray]] = {}
 
     def renderer(self, values: Values, model: Model, friction: float | None = None) -> Any:
         """The simulator with those settings over its own; the last few are kept, as some factorise."""
-        given = over(self.options.simulator_set, dict(sorted(values.items())))
+        given = self._given(values)
         key = given, id(model), friction
         if key not in self._made:
             while len(self._made) > 3:
@@ -115,15 +121,31 @@ class Runs:
             self._made[key] = create(self.name, model, options, on_demand=True)
         return self._made[key]
 
-    def run(self, values: Values, path: TruePath) -> tuple[Sums, np.ndarray]:
-        """(what it missed, (n, 3) N along the path); zeros where the simulator ends without a force."""
+    def _given(self, values: Values) -> str:
+        return over(self.options.simulator_set, dict(sorted(values.items())))
+
+    def run(self, values: Values, path: TruePath, progress: Progress = silent) -> tuple[Sums, np.ndarray]:
+        """(what it missed, (n, 3) N along the path); zeros where the simulator ends without a force. Whatever
+        progress raises ends the run."""
+        progress("replay", 0.0)
+        key = self._given(values), id(path)
+        if key not in self._ran:
+            try:
+                self._ran[key] = path, *self._run(values, path, progress)
+            except BaseException:
+                self._made.clear()  # a touch that was left in its midst serves no other
+                raise
+        return self._ran[key][1:]
+
+    def _run(self, values: Values, path: TruePath, progress: Progress) -> tuple[Sums, np.ndarray]:
+        begun = self.now()
         made = self.renderer(values, path.model, path.friction)
         ended: tuple[str, ...] = ()
         before = _cost(made)
         try:
             force = replay(
-                made, path.t, path.centre, tip_radius_m=path.model.tool.tip_radius_m, progress=silent,
-                checked=False,
+                made, path.t, path.centre, tip_radius_m=path.model.tool.tip_radius_m, progress=progress,
+                checked=False, chunk=TOLD,
             )  # fmt: skip
         except OptionError as error:
             force, ended = np.zeros_like(path.centre), (f"{path.name}: {error}",)
@@ -132,5 +154,6 @@ class Runs:
         sums = Sums(
             float(((at - path.force) ** 2).sum()), float((at * path.force).sum()), float((at**2).sum()),
             float((path.force**2).sum()), len(at), spent, simulated, ended,
+            self.now() - begun,
         )  # fmt: skip
         return sums, force

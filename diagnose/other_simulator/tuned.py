@@ -10,8 +10,13 @@ from typing import Any
 from palpate.diagnosis.other_simulator.runs import Runs, Sums, TruePath, Values
 from palpate.diagnosis.other_simulator.tuning import NEAR, Budget, Search, Trial
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.progress import Clocked, Progress, TimeIsUp, silent, until
 from palpate.mechanics.result import Result
+from palpate.render.simulators.base import Adapter
+
+HELD = "held-out presses"
+JUDGED = 0.25
+"""Share of the time that is left which the start may be judged for; the end takes as long."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +31,8 @@ class Moved:
 
 @dataclass(frozen=True)
 class Unseen:
-    """A shape that was not tuned on: N rms off its true force before and after; N rms of its bound, and of
-    the force."""
+    """A shape that was not tuned on: N rms off its true force before and after (NaN: not pressed); N rms of
+    its bound, and of the force."""
 
     name: str
     gap_before_n: float
@@ -57,6 +62,8 @@ class Tuned(Result):
     of the latter; target_n: where tuning ends; least_n: the least that any settings reached. scale, scaled_n:
     the factor on the modulus that would come nearest, and what it would leave. modulus_moved: share by which
     the modulus that the simulator was given is off the model's. named: numerical effects of the diagnosis.
+    time_is_up: trials ended with the time; interrupted: or by this; undone: what there was no time for, whose
+    numbers are NaN.
     `plot`: error over cost; `show`: nothing.
     """
 
@@ -89,13 +96,15 @@ class Tuned(Result):
     time_is_up: bool
     named: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    undone: tuple[str, ...] = ()
+    interrupted: KeyboardInterrupt | None = None
 
     @property
     def worse(self) -> tuple[str, ...]:
         """What was not tuned on and is farther off than before, and than its force is known to."""
         held = self.gap_after_n > max(self.gap_before_n, self.target_n)
         shapes = [s.name for s in self.unseen if s.gap_after_n > max(s.gap_before_n, s.bound_n)]
-        return (*(["held-out presses"] if held else []), *shapes)
+        return (*([HELD] if held else []), *shapes)
 
 
 @dataclass(frozen=True)
@@ -107,9 +116,49 @@ class Judged:
     unseen: Sequence[TruePath]
 
 
-def off(runs: Runs, values: Values, paths: Sequence[TruePath]) -> Sums:
+def off(runs: Runs, values: Values, paths: Sequence[TruePath], progress: Progress = silent) -> Sums:
     """What settings miss of some paths, together."""
-    return sum((runs.run(values, path)[0] for path in paths), Sums())
+    return sum((runs.run(values, path, progress)[0] for path in paths), Sums())
+
+
+def start_of(adapter: Adapter) -> dict[str, float]:
+    """Of every setting that may be tuned, what it is."""
+    return {t.name: float(getattr(adapter.own, t.name)) for t in adapter.tunables}
+
+
+class _Pressed:
+    """How far off settings are on what was not tuned on, part by part, as far as the time goes or until it is
+    interrupted."""
+
+    def __init__(self, runs: Runs, judged: Judged) -> None:
+        held = {HELD: judged.held} if judged.held else {}
+        self.runs, self.parts = runs, {**held, **{path.name: [path] for path in judged.unseen}}
+        self.interrupted: KeyboardInterrupt | None = None
+
+    def off(
+        self,
+        values: Values,
+        when: str,
+        progress: Progress,
+        fits: Callable[[str], bool] = lambda name: True,
+    ) -> dict[str, Sums]:
+        """By name, of those that were pressed to their end; fits(name): whether one is begun at all, as a
+        solver that factorises hears of no time."""
+        sums: dict[str, Sums] = {}
+        try:
+            for name, paths in self.parts.items():
+                if not fits(name):
+                    continue
+                sums[name] = off(self.runs, values, paths, _named(progress, f"{name} {when}"))
+        except TimeIsUp:
+            pass
+        except KeyboardInterrupt as how:
+            self.interrupted = how
+        return sums
+
+
+def _named(progress: Progress, stage: str) -> Progress:
+    return lambda _, fraction: progress(stage, fraction)
 
 
 def tuned(
@@ -125,49 +174,57 @@ def tuned(
     notes: Sequence[str] = (),
     begun_s: float | None = None,
     progress: Progress = silent,
-    now: Callable[[], float] | None = None,
+    now: Clocked | None = None,
 ) -> Tuned:
     """Tune, then judge. within_s: for all of it, by the clock, from begun_s on; at_most: processor ms a step,
-    s a simulated second. The judgement takes its time; trials end early enough for it."""
-    clock = now or Budget().now
+    s a simulated second. The judgement takes its time; trials end early enough for it.
+
+    Ctrl-C ends it with what was found so far. Raises TimeIsUp where the start itself was not run in time."""
+    clock = now or runs.now
     begun = clock() if begun_s is None else begun_s
+    by_clock = until(progress, begun, within_s, now=clock)
     adapter = runs.renderer({}, model).adapter
-    start = {t.name: float(getattr(adapter.own, t.name)) for t in adapter.tunables}
+    start = start_of(adapter)
 
     def step_of(values: Values) -> float:
         path = judged.fitted[0]
         usual = (path.t[-1] - path.t[0]) / max(len(path.t) - 1, 1)
         return float(values.get("timestep_s", getattr(adapter.own, "timestep_s", usual)))
 
-    progress("how it is off before", 0.0)
-    first = clock()
-    held_before = off(runs, start, judged.held)
-    shapes_before = [off(runs, start, [path]) for path in judged.unseen]
-    count = len(judged.held) + len(judged.unseen)
-    after = count, (clock() - first) / max(count, 1)
+    off(runs, start, judged.fitted, _named(by_clock, "how it is off before"))
+    pressed = _Pressed(runs, judged)
+    share = (clock() - begun) / within_s
+    before = pressed.off(
+        start, "before", until(progress, begun, within_s, share + JUDGED * (1 - share), clock)
+    )
     target_n = NEAR * max(noise_n, law_n)
 
     def tell(trials: int, gap_n: float) -> None:
-        left = max(begun + within_s - clock(), 0.0)
-        share = min((clock() - begun) / within_s, 0.95) if within_s else 0.95
-        progress(
-            f"{trials} settings tried, {1e3 * gap_n:.3g} mN off ({1e3 * target_n:.3g} asked), "
-            f"{left / 60:.1f} min left", share,
-        )  # fmt: skip
+        words = f"{trials} settings tried, {1e3 * gap_n:.3g} mN off ({1e3 * target_n:.3g} asked)"
+        progress(words, min((clock() - begun) / within_s, 1.0))
 
     search = Search(
         runs, judged.fitted, adapter.tunables, start, target_n=target_n, step_of=step_of,
-        budget=Budget(begun + within_s, *at_most, clock), after=after, tell=tell,
+        budget=Budget(begun + within_s, *at_most, clock), tell=tell,
+        after_s=sum(sums.took_s for sums in before.values()),
     )  # fmt: skip
-    best = search.run(named)
     was = search.tried(start, None)
-    progress("how it is off after", 0.97)
-    same = best.values == start
-    held = held_before if same else off(runs, best.values, judged.held)
-    shapes = shapes_before if same else [off(runs, best.values, [path]) for path in judged.unseen]
+    best = was if pressed.interrupted else search.run(named)
+    interrupted = pressed.interrupted or search.interrupted
+    after: dict[str, Sums] = before if best.values == start else {}
+    if not interrupted and best.values != start:
+        pressed.parts = {name: pressed.parts[name] for name in before}
+        slower = max(1.0, best.path_s / was.path_s) if was.path_s else 1.0
+
+        def fits(name: str) -> bool:
+            return clock() + slower * before[name].took_s <= begun + within_s
+
+        after = pressed.off(best.values, "after", by_clock, fits)
+    interrupted = interrupted or pressed.interrupted
+    lost = [name for name in _Pressed(runs, judged).parts if name not in after]
     given = adapter.stated["young_modulus_pa"]
     dear = [] if search.budget.over(best) == 1.0 else ["nothing that was tried costs as little as was asked"]
-    ended = list(dict.fromkeys(why for sums in (best.sums, held, *shapes) for why in sums.ended))
+    ended = list(dict.fromkeys(why for sums in (best.sums, *after.values()) for why in sums.ended))
     return Tuned(
         simulator=adapter.name,
         version=adapter.version,
@@ -185,11 +242,14 @@ def tuned(
         target_n=target_n,
         fitted_before_n=was.gap_n,
         fitted_after_n=best.gap_n,
-        gap_before_n=held_before.gap_n,
-        gap_after_n=held.gap_n,
+        gap_before_n=_gap_n(before, HELD) if judged.held else 0.0,
+        gap_after_n=_gap_n(after, HELD) if judged.held else 0.0,
         unseen=tuple(
-            Unseen(p.name, a.gap_n, b.gap_n, p.bound_n or 0.0, math.sqrt(b.true / max(b.count, 1)))
-            for p, a, b in zip(judged.unseen, shapes_before, shapes, strict=True)
+            Unseen(
+                p.name, _gap_n(before, p.name), _gap_n(after, p.name), p.bound_n or 0.0,
+                math.sqrt((p.force**2).sum() / len(p.force)),
+            )
+            for p in judged.unseen
         ),
         ms_per_step_before=was.ms_per_step,
         ms_per_step=best.ms_per_step,
@@ -204,7 +264,14 @@ def tuned(
         time_is_up=search.time_is_up,
         named=tuple(named),
         notes=(*notes, *dear, *(f"ended without a force: {why}" for why in ended)),
+        undone=tuple(lost),
+        interrupted=interrupted,
     )  # fmt: skip
+
+
+def _gap_n(sums: dict[str, Sums], name: str) -> float:
+    """N rms; NaN where it was not pressed."""
+    return sums[name].gap_n if name in sums else math.nan
 
 
 def _priced(trial: Trial, start: Values) -> Priced:
@@ -231,5 +298,7 @@ def as_json(result: Tuned) -> dict[str, Any]:
         "modulus_would": {"factor": result.scale, "gap_after_n": result.scaled_n},
         "effects": list(result.named),
         "worse": list(result.worse),
+        "undone": list(result.undone),
+        "interrupted": result.interrupted is not None,
         "notes": list(result.notes),
     }

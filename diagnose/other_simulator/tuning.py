@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from palpate.diagnosis.other_simulator.runs import Runs, Sums, TruePath, Values
+from palpate.mechanics.progress import Clocked, TimeIsUp
 from palpate.render.simulators.tunable import Tunable
 
 NEAR = 1.05
@@ -23,10 +24,8 @@ LINES = 2
 """Of the settings that help, how many are followed to their best before the next is sought beside one."""
 HALF = 0.5
 """Share of the gap: a setting whose rung beside leaves less is followed at once."""
-
-
-class _TimeIsUp(Exception):
-    """The time that was given for trials is over."""
+MARGIN = 1.2
+"""Times what the judgement is expected to take, which is kept for it."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class Budget:
     deadline_s: float = math.inf
     ms_per_step: float = math.inf
     cost: float = math.inf
-    now: Callable[[], float] = time.monotonic
+    now: Clocked = time.monotonic
 
     def over(self, trial: Trial) -> float:
         """How many times too expensive, 1 at least."""
@@ -69,8 +68,9 @@ class Budget:
 
 class Search:
     """Settings of one simulator over some paths. target_n: N, where the search ends; step_of(values): s, of
-    the simulator with these; after: how many paths are run after the trials, and s
-    that one takes at least; tell(trials, best gap in N): after each trial."""
+    the simulator with these; after_s: what is run after the trials took with the start's settings;
+    tell(trials, best gap in N): after each trial. time_is_up: whether it ended the search; interrupted:
+    what did."""
 
     def __init__(
         self,
@@ -82,15 +82,16 @@ class Search:
         target_n: float,
         step_of: Callable[[Values], float],
         budget: Budget | None = None,
-        after: tuple[int, float] = (0, 0.0),
+        after_s: float = 0.0,
         tell: Callable[[int, float], None] = lambda trials, gap_n: None,
     ) -> None:
         self.runs, self.paths, self.tunables, self.tell = runs, paths, tunables, tell
         self.target_n, self.budget, self._step_of = target_n, budget or Budget(), step_of
-        (self._after, self._each_s), self._longest_s = after, 0.0
+        self._after_s, self._longest_s = after_s, 0.0
         self.start = dict(start)
         self.trials: dict[tuple[tuple[str, float], ...], Trial] = {}
         self.time_is_up = False
+        self.interrupted: KeyboardInterrupt | None = None
 
     def run(self, named: Sequence[str] = ()) -> Trial:
         """The best settings; named: numerical effects that the diagnosis names, the strongest first."""
@@ -100,8 +101,10 @@ class Search:
         try:
             self._descend(first, order)
             self._set_back()
-        except _TimeIsUp:
+        except TimeIsUp:
             self.time_is_up = True
+        except KeyboardInterrupt as how:
+            self.interrupted = how
         return self.best()
 
     def best(self) -> Trial:
@@ -136,31 +139,36 @@ class Search:
         return self.budget.over(trial), trial.gap_n if trial.whole else math.inf
 
     def tried(self, values: Values, rival: Trial | None) -> Trial:
-        """A trial of these settings, to its end where it may beat the rival. Raises _TimeIsUp."""
+        """A trial of these settings, to its end where it may beat the rival. Raises TimeIsUp."""
         key = self._key_of(values)
         known = self.trials.get(key)
         if known is not None and (known.whole or rival is None or known.sums.missed > rival.sums.missed):
             return known
         # a rival that is too expensive is beaten by cost as well
         most = math.inf if rival is None or self.budget.over(rival) > 1 else rival.sums.missed
-        sums, done, took = Sums(), 0, 0.0
+        sums, done, end_s = Sums(), 0, self.budget.deadline_s - self._reserved_s()
+
+        def watched(stage: str, fraction: float) -> None:
+            if self.trials and self.budget.now() > end_s:
+                raise TimeIsUp
+
         for path in self.paths:
-            begun = self.budget.now()
-            if self.trials and begun + self._longest_s + self._reserved_s() > self.budget.deadline_s:
-                raise _TimeIsUp
-            sums, done = sums + self.runs.run(values, path)[0], done + 1
-            took += self.budget.now() - begun
-            self._longest_s = max(self._longest_s, took / done)
+            if self.trials and self.budget.now() + self._longest_s > end_s:
+                raise TimeIsUp
+            sums, done = sums + self.runs.run(values, path, watched)[0], done + 1
+            self._longest_s = max(self._longest_s, sums.took_s / done)
             if sums.missed > most:
                 break
-        trial = Trial(dict(values), sums, done == len(self.paths), self._step_of(values), took / done)
+        trial = Trial(dict(values), sums, done == len(self.paths), self._step_of(values), sums.took_s / done)
         self.trials[key] = trial
         self.tell(len(self.trials), self.best().gap_n)
         return trial
 
     def _reserved_s(self) -> float:
-        """s that what comes after the trials takes."""
-        return self._after * max(self._each_s, self.best().path_s)
+        """s that what comes after the trials takes: longer, as the best settings so far are slower."""
+        first = self.trials.get(self._key_of(self.start))
+        slower = 1.0 if first is None or not first.path_s else self.best().path_s / first.path_s
+        return MARGIN * self._after_s * max(1.0, slower)
 
     def _descend(self, current: Trial, spoken: Sequence[Tunable]) -> None:
         while not self._met(current):

@@ -94,6 +94,14 @@ def diagnose(
             metavar="SETTINGS",
         ),
     ] = None,
+    baseline: Annotated[
+        Any,
+        option(
+            "judge it against the same simulator at its best: of --simulated those forces, BASE.csv (the "
+            "object as the model says); of --renderer its settings, as for --mended",
+            metavar="BASE",
+        ),
+    ] = None,
     presses: Annotated[
         int | None,
         option(
@@ -153,10 +161,13 @@ def diagnose(
     from palpate.reconstruction.presses_on_model import presses_on
 
     runs = [(simulator_settings, simulator_set)]
-    if mended is not None and renderer is not None:
-        runs.append(mended_by(*runs[0], mended))
+    if renderer is not None:
+        runs += [mended_by(*runs[0], by) for by in (baseline, mended) if by is not None]
     _check(simulated, renderer, mended, presses, stated, runs)
+    if baseline is not None and renderer is None and simulated is None:
+        raise OptionError("--baseline is of another simulator: name it by --simulated or --renderer")
     forces = None if simulated is None else _forces(simulated)
+    best = None if baseline is None or simulated is None else _forces(baseline)
     if corrected and not str(corrected).endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{corrected}' must end in .csv or .csv.gz")
     source, measured = given_model(model, file), read_recording(recording)
@@ -180,11 +191,12 @@ def diagnose(
             result = diagnosed(measured, made, options, rest, **rules)
         else:
             from palpate.diagnosis.other_simulator.declared_parameters import stated_of
-            from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
+            from palpate.diagnosis.other_simulator.pipeline import Asked, Base, diagnose_simulated
             from palpate.diagnosis.other_simulator.result import Mended
 
             if forces is not None:
-                simulation = Asked(forces, stated_of(stated, made), of_forces)
+                base = None if best is None else Base(best, stated_of({}, made))
+                simulation = Asked(forces, stated_of(stated, made), of_forces, base)
                 result = diagnose_simulated(measured, made, simulation, options, rest, **rules)
             else:
                 assert renderer is not None
@@ -199,6 +211,8 @@ def diagnose(
                     half,
                 )
                 first, again = simulations[0], simulations[1:]
+                if baseline is not None:
+                    first, again = replace(first, base=Base(again[0].forces, again[0].stated)), again[1:]
                 result = diagnose_simulated(
                     measured, made, first, options, part(rest_of_it, 0.5, 0.9), **rules
                 )
@@ -293,7 +307,7 @@ def _simulations(
         forces = Forces(measured.t, ran.force, each.name, notes, chosen)
         # what the adapter gave it, but for what is said
         stated = stated_of({**ran.adapter.stated, **stated_values(given)}, each.model)
-        of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
+        of_adapter = None, ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
         plain = replace(of_forces, clock_offset_s=0.0, simulated_axes=AS_RECORDED, simulated_unit="N")
         simulations.append(Asked(forces, stated, plain, *of_adapter))
     return simulations

@@ -11,12 +11,14 @@ from __future__ import annotations
 import math
 import re
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
 from palpate.mechanics.errors import DiagnosisError, OptionError
-from palpate.mechanics.progress import part
+from palpate.mechanics.progress import TimeIsUp, part, until
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, operation, option
 from palpate.operations._shared import MeshFileOptions, RecordingArgument, given_model, save_option
@@ -41,6 +43,8 @@ if TYPE_CHECKING:
 
 SHAPES = ("kidney", "dome")
 """Bodies of the conformance kit that settings are judged on."""
+DIAGNOSED = 0.4
+"""Share of the time at which the diagnosis of the start is given up: it says only what to try first."""
 _TIME = re.compile(r"([0-9.]+)\s*(s|min|h)")
 _COST = re.compile(r"([0-9.]+)\s*(ms/step|s/s)")
 
@@ -120,7 +124,7 @@ def tune(
     installed or a setting is not there, DiagnosisError for fewer presses than two.
     """
     from palpate.diagnosis.other_simulator.runs import Runs, path_of_press
-    from palpate.diagnosis.other_simulator.tuned import Judged, off, tuned
+    from palpate.diagnosis.other_simulator.tuned import Judged, off, start_of, tuned
     from palpate.exporting.settings import check_suffix
     from palpate.reconstruction.presses_on_model import presses_on
     from palpate.render.options import RenderOptions
@@ -135,11 +139,12 @@ def tune(
         check_suffix(renderer, save)
     begun = time.monotonic()
     source, measured = given_model(model, file), read_recording(recording)
-    with call.progress("tune") as show_progress:
+    with call.progress("tune") as show_progress, _in_time(within):
+        by_clock = until(show_progress, begun, within_s)
         if source is None:
-            made = reconstruct(measured, progress=part(show_progress, 0.0, 0.1)).model
+            made = reconstruct(measured, progress=by_clock).model
         else:
-            made = load(source, progress=show_progress)
+            made = load(source, progress=by_clock)
         table = presses_on(measured, made)
         runs = Runs(
             renderer, RenderOptions(simulator_settings=simulator_settings, simulator_set=simulator_set)
@@ -156,22 +161,52 @@ def tune(
                 f"Poisson's ratio {nu:g} is not taken: {renderer} is given {adapter.poisson_limit:g}, the "
                 "most that it takes, and what that changes no setting mends",
             )
+        off(runs, start_of(adapter), fitted, by_clock)
         named: tuple[str, ...] = ()
         if diagnosed:
-            named, told = _named(measured, made, table, runs, paths, part(show_progress, 0.1, 0.4))
+            progress = until(show_progress, begun, within_s, DIAGNOSED)
+            try:
+                named, told = _named(measured, made, table, runs, paths, progress)
+            except TimeIsUp:
+                told = [
+                    f"the diagnosis of the start was given up after {100 * DIAGNOSED:.0f} % of the time: "
+                    "settings were tried in their usual order"
+                ]
             notes += told
-        law = Runs("fem", RenderOptions())
-        law_n = off(law, {}, fitted).gap_n
+        law_n = off(Runs("fem", RenderOptions()), {}, fitted, by_clock).gap_n
         tip_m, young_pa = made.tool.tip_radius_m, made.material.young_modulus_pa
         unseen = [path_of_body(scaled_body(name, young_pa, tip_m)) for name in SHAPES] if shapes else []
         result = tuned(
             runs, made, Judged(fitted, held, unseen), noise_n=table.vector_noise_n, law_n=law_n,
             within_s=within_s, at_most=cost, named=named, notes=notes, begun_s=begun,
-            progress=part(show_progress, 0.4, 1.0),
+            progress=show_progress,
         )  # fmt: skip
     if save is not None:
         call.then_save(result, save) if call.command else result.save(save)
+    if result.interrupted is not None:
+        call.exit_code = _raises(result.interrupted)  # once all that was found is said and written
+        if not call.command:
+            raise result.interrupted
     return result
+
+
+@contextmanager
+def _in_time(within: str) -> Iterator[None]:
+    """Raises OptionError where the time is over before a setting was tried."""
+    try:
+        yield
+    except TimeIsUp as over:
+        raise OptionError(
+            f"--within {within} was over before a setting was tried, and nothing was tuned: what comes first "
+            "(reconstruction unless --model is given, the simulator as it is, our ideal model) takes longer"
+        ) from over
+
+
+def _raises(how: BaseException) -> Callable[[], int]:
+    def end() -> int:
+        raise how
+
+    return end
 
 
 def _chosen(presses: Presses, most: int) -> np.ndarray:
@@ -204,20 +239,22 @@ def _named(
     from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions
     from palpate.diagnosis.other_simulator.frame import AS_RECORDED
     from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
+    from palpate.diagnosis.other_simulator.tuned import start_of
     from palpate.render.replay import rows_of_touch
 
     force, chosen = np.zeros_like(measured.position), np.zeros(len(presses), dtype=bool)
+    adapter = runs.renderer({}, made).adapter
+    start = start_of(adapter)
     for k, (number, path) in enumerate(paths.items()):
         progress(f"{runs.name} as it is, press {k + 1} of {len(paths)}", 0.5 * k / len(paths))
-        sums, found = runs.run({}, path)
+        sums, found = runs.run(start, path, progress)
         if not sums.ended:
             force[rows_of_touch(measured.t, presses, number)] = found
             chosen[number] = True
-    adapter = runs.renderer({}, made).adapter
     plain = ForcesOptions(clock_offset_s=0.0, simulated_axes=AS_RECORDED, simulated_unit="N")
     asked = Asked(
         Forces(measured.t, force, runs.name, (), chosen), stated_of(adapter.stated, made), plain,
-        adapter.version, adapter.advice, "", adapter.poisson_limit,
+        None, adapter.version, adapter.advice, "", adapter.poisson_limit,
     )  # fmt: skip
     try:
         found_gap = diagnose_simulated(

@@ -149,6 +149,8 @@ DIAGNOSE = table(
     },
     exact=SOLVED_PLACES,
 )
+_OWN = table({"effects": TEXTS, "candidates": TEXTS, "off_n": NUMBER})
+_MADE_UP = table({"effects": many(TEXT, 2), "alone_n": many(NUMBER, 2), "together_n": NUMBER})
 _PART = table({"gap_n": MAYBE, "share": MAYBE, "effects": TEXTS})
 DIAGNOSE_SIMULATOR = table(
     {
@@ -171,6 +173,8 @@ DIAGNOSE_SIMULATOR = table(
             }
         ),
         "parts": table({"reality": _PART, "parameters": _PART, "numerics": _PART}),
+        "own": or_null(_OWN),
+        "made_up": many(_MADE_UP),
         "unexplained": MAYBE,
         "unexplained_n": MAYBE,
         "unexplained_of": table({"noise": MAYBE, "first_touches": MAYBE}),
@@ -210,7 +214,11 @@ _STATE = {
 }
 _MOVED = table({"name": TEXT, "before": MAYBE, "after": MAYBE, "term": TEXT})
 _UNSEEN = table(
-    {"name": TEXT, **dict.fromkeys(("gap_before_n", "gap_after_n", "bound_n", "force_n"), NUMBER)}
+    {
+        "name": TEXT,
+        **dict.fromkeys(("gap_before_n", "gap_after_n"), MAYBE),
+        **dict.fromkeys(("bound_n", "force_n"), NUMBER),
+    }
 )
 _PRICED = table({"ms_per_step": NUMBER, "s_per_s": NUMBER, "gap_n": NUMBER, "moved": named(MAYBE)})
 TUNE = table(
@@ -219,7 +227,8 @@ TUNE = table(
         "settings": named(MAYBE),
         "began": named(MAYBE),
         "moved": many(_MOVED),
-        **dict.fromkeys(("gap_before_n", "gap_after_n", "fitted_before_n", "fitted_after_n"), NUMBER),
+        **dict.fromkeys(("gap_before_n", "gap_after_n"), MAYBE),
+        **dict.fromkeys(("fitted_before_n", "fitted_after_n"), NUMBER),
         **dict.fromkeys(("noise_n", "law_n", "target_n", "least_n"), NUMBER),
         "unseen_shapes": many(_UNSEEN),
         **dict.fromkeys(("ms_per_step_before", "ms_per_step", "s_per_s", "seconds"), NUMBER),
@@ -229,6 +238,8 @@ TUNE = table(
         "trials": COUNT,
         "time_is_up": FLAG,
         "worse": TEXTS,
+        "undone": TEXTS,
+        "interrupted": FLAG,
         "effects": TEXTS,
         "notes": TEXTS,
     }

@@ -168,6 +168,7 @@ def story(result: SimulatedGap) -> say.Story:
         yield say.Sentence(f"its forces are read as {' in '.join(read_as)}, not x,y,z in N (see the notes)")
     yield say.Next(result.advice, on=say.PAGE)
     yield from _parts(result)
+    yield from (say.Sentence(words) for words in _against_its_best(result))
     if result.mended is not None:
         again = f"run again with {result.mended.settings}: {mended_words(result)}"
         yield say.Sentence(again)
@@ -220,6 +221,26 @@ def _parts(result: SimulatedGap) -> say.Story:
         on=say.TEXT,
     )
     yield say.Cards(cards)
+
+
+def _against_its_best(result: SimulatedGap) -> list[str]:
+    """What it has of its own, and which errors make up for each other."""
+    said, own = [], result.own
+    if own is not None:
+        which = spoken(own.effects) or "nothing that has a name"
+        others = f" (not ruled out: {spoken(own.candidates, 'or')})" if own.candidates else ""
+        said.append(
+            f"at its best settings it is {force_words(own.off_n)} off the law: {which}{others}; the numerics "
+            "that are named come on top of that"
+        )
+    for pair in result.made_up:
+        one, two = (
+            f"{spaced(name)} ({force_words(alone)})"
+            for name, alone in zip(pair.effects, pair.alone_n, strict=True)
+        )
+        together = force_words(pair.together_n)
+        said.append(f"{one} and {two} make up for each other (together {together}): mend both, or neither")
+    return said
 
 
 def _seen(result: SimulatedGap) -> say.Story:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,7 +51,7 @@ def story(result: Tuned) -> say.Story:
 
 
 def _mn(newtons: float) -> str:
-    return f"{1e3 * newtons:.3g}"
+    return f"{1e3 * newtons:.3g}" if math.isfinite(newtons) else "not done"
 
 
 def _words(point: Priced) -> str:
@@ -71,9 +72,18 @@ def _lead(result: Tuned) -> str:
 
 
 def _certified(result: Tuned) -> str:
+    if result.undone:
+        why = "interrupted" if result.interrupted else "the time was over"
+        lacks = f"not done ({why}): {listed(result.undone)} after tuning; "
+    else:
+        lacks = ""
     if not result.worse:
+        if result.undone:
+            return f"{lacks}whether it carries over to them is not known"
         return "it carries over: nowhere is the error larger than before and than its force is known to"
-    return f"it does not carry over to {listed(result.worse)}: farther off than before, and than is known"
+    return (
+        f"{lacks}it does not carry over to {listed(result.worse)}: farther off than before, and than is known"
+    )
 
 
 def _unreached(result: Tuned) -> str:
@@ -83,7 +93,8 @@ def _unreached(result: Tuned) -> str:
     asked += f"simulation {force_words(result.law_n)})"
     if result.fitted_after_n <= result.target_n:
         return f"{asked}: met"
-    out_of_time = "; the time was over before all was tried" if result.time_is_up else ""
+    ended = "it was interrupted" if result.interrupted else "the time was over" if result.time_is_up else ""
+    out_of_time = f"; {ended} before all was tried" if ended else ""
     only = f"only a modulus {percent(abs(result.scale - 1))} {'higher' if result.scale > 1 else 'lower'} "
     return (
         f"{asked}; the least that any setting reached is {force_words(result.least_n)}{out_of_time}; {only}"

@@ -5,7 +5,6 @@ import pytest
 
 from benchmarks._adapter_flaws import CONTROLS, LAYOUT, POISSON, Parameters, drawn_plan
 from benchmarks._simulated_flaws import FLAWS, MODULUS_PA, RADIUS_M, Block, Given, simulated
-from benchmarks._simulated_scores import new_in
 from benchmarks.simulated import _verdict, _world
 from palpate.diagnosis.other_simulator.forces import Forces
 
@@ -45,17 +44,6 @@ def test_pairs_of_a_simulators_flaws_are_two_of_its_single_ones(parameters):
     changed = CONTROLS["drake"].but({"damping_s": 0.05, "cells": 5})
     assert changed.settings["damping_s"] == 0.05 and changed.cells == 5
     assert changed.settings["sphere_radii"] == CONTROLS["drake"].settings["sphere_radii"]
-
-
-def test_what_a_simulator_has_of_its_own_is_no_answer_to_what_was_planted():
-    row = {
-        "sizes_n": {"damping": 0.1}, "right": {"damping": ["numerical_damping"]}, "own": ["mesh_stiffness"],
-        "named": ["mesh_stiffness", "numerical_damping"],
-    }  # fmt: skip
-    assert new_in(row) == ["numerical_damping"]
-    row |= {"right": {"damping": ["mesh_stiffness"]}}
-    assert new_in(row)[0] == "mesh_stiffness"
-    assert new_in({"sizes_n": {"time_step": 0.1}, "named": ["time_step"]}) == ["time_step"]
 
 
 @pytest.mark.release

@@ -24,7 +24,7 @@ from palpate.diagnosis.other_simulator.forces import (
     spread_out,
 )
 from palpate.diagnosis.other_simulator.gap_decomposition import PARAMETER_OF, StatedParameter
-from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
+from palpate.diagnosis.other_simulator.pipeline import Asked, Base, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import EffectEntry
@@ -113,6 +113,38 @@ def test_a_tip_held_by_a_spring_is_contact_stiffness_with_that_springs(world):
     assert result.effects == ("contact_stiffness",)
     found = next(e for e in result.entries if e.name == "contact_stiffness")
     assert found.parameters["stiffness_n_per_m"] == pytest.approx(1000.0, rel=0.06)
+
+
+@pytest.mark.slow
+def test_a_simulator_that_is_off_already_is_judged_against_its_best(world):
+    """Its mesh is half too stiff at its best, and a contact that is then made soft takes some of that off."""
+    real = world[2].forward
+    forward = StatedForward(real.touches, real.places, stated_of({}, world[1]))
+    law, soft = forward.ideal(1.0), forward.ideal(1.0)
+    soft.tool_compliance += 1e-3
+    law, soft = (np.nan_to_num(forward.predict(settings)) for settings in (law, soft))
+    frame = real.places.frame[real.touches.press]
+
+    def forces(local):
+        return Forces(real.touches.t, np.einsum("nij,ni->nj", frame, local), "a simulator")
+
+    stated = stated_of({}, world[1])
+    base = Base(forces(1.5 * law), stated)
+
+    def judged_against(base, local):
+        asked = Asked(forces(local), stated, OWN_CLOCK, base)
+        return diagnose_simulated(*world[:2], asked, FAST, reality=world[2])
+
+    alone = judged_against(None, 0.5 * law + soft)
+    result = judged_against(base, 0.5 * law + soft)
+    assert alone.effects[0] == "mesh_stiffness"  # what is asked for is what was changed
+    assert result.effects == ("contact_stiffness",) and result.own.effects == ("mesh_stiffness",)
+    assert shares(result) == pytest.approx(1.0)
+    (pair,) = result.made_up
+    assert set(pair.effects) == {"contact_stiffness", "its own"} and pair.together_n < max(pair.alone_n)
+    assert "make up for each other" in "\n".join(result.lines())
+    unchanged = judged_against(base, 1.5 * law)
+    assert unchanged.effects == () and unchanged.made_up == ()
 
 
 @pytest.mark.slow

@@ -162,6 +162,103 @@ def test_the_certificate_is_of_what_was_not_tuned_on(springs):
     assert isinstance(found, pp.Tuned) and "does not carry over to soft" in str(found)
 
 
+def said(found):
+    import_module("palpate.show")  # a result says itself once that is there
+    return "\n".join(found.lines())
+
+
+class Ticking(Springs):
+    """Each of its steps takes 10 ms of a clock that starts at 0; ends_at: s, when Ctrl-C comes."""
+
+    clock_s, ends_at, begins_s = 0.0, math.inf, 0.0
+
+    def begin(self, tip, radius_m):
+        type(self).clock_s += self.begins_s * (100.0 if self.own.n_per_m > 250.0 else 1.0)
+        return super().begin(tip, radius_m)
+
+    def step(self, dt_s, tip):
+        type(self).clock_s += 0.01
+        if self.clock_s > self.ends_at:
+            type(self).ends_at = math.inf
+            raise KeyboardInterrupt
+        return super().step(dt_s, tip)
+
+
+@pytest.fixture
+def ticking(springs, monkeypatch):
+    """Tunes springs within so many seconds of the clock, of which one run along a path takes about one."""
+    monkeypatch.setattr(
+        "palpate.diagnosis.other_simulator.runs.create",
+        lambda name, model, options, on_demand: SimulatorRenderer(name, model, Ticking, options),
+    )
+    monkeypatch.setattr(Ticking, "clock_s", 0.0)
+    monkeypatch.setattr(Ticking, "ends_at", math.inf)
+
+    def run(within_s, ends_at=math.inf):
+        Ticking.ends_at = ends_at
+        runs = Runs("springs", RenderOptions(), lambda: Ticking.clock_s)
+        shapes = [replace(press(springs, 0.002), name=name) for name in ("one", "two")]
+        judged = Judged([press(springs, 0.002)], [press(springs, 0.0015)], shapes)
+        return tuned(runs, springs, judged, noise_n=1e-6, law_n=0.0, within_s=within_s)
+
+    return run
+
+
+@pytest.mark.parametrize("within_s", [1.5, 3.0, 6.0, 12.0, 20.0])
+def test_the_time_is_kept_with_the_judgement_in_it(ticking, within_s):
+    found = ticking(within_s)
+    assert Ticking.clock_s <= within_s + 0.2 and found.seconds <= within_s + 0.2
+    assert all(math.isnan(s.gap_after_n) == (s.name in found.undone) for s in found.unseen)
+    assert all(name in said(found) for name in found.undone)
+    if within_s >= 20.0:
+        assert found.undone == () and found.moved and found.gap_after_n < 0.2 * found.gap_before_n
+    if within_s <= 3.0:
+        assert "two" in found.undone
+
+
+def test_a_solver_that_hears_of_no_time_is_not_begun_late(ticking, monkeypatch):
+    """What is nearest takes a second to begin, of which nobody is told; and trials left no time for it."""
+    monkeypatch.setattr(Ticking, "begins_s", 0.01)
+    monkeypatch.setattr("palpate.diagnosis.other_simulator.tuning.MARGIN", 0.5)
+    for within_s in (9.0, 10.0, 11.0, 12.0, 13.0, 14.0):
+        Ticking.clock_s = 0.0
+        ticking(within_s)
+        assert Ticking.clock_s <= within_s + 0.2
+
+
+def test_what_was_found_until_ctrl_c_is_kept_and_what_is_lacking_said(ticking, tmp_path):
+    """In the trials, and in the judgement after them."""
+    whole = ticking(20.0)
+    last_s, Ticking.clock_s = Ticking.clock_s, 0.0
+    for ends_at, lost in ((14.0, {"held-out presses", "one", "two"}), (last_s - 0.5, {"two"})):
+        Ticking.clock_s = 0.0
+        found = ticking(20.0, ends_at)
+        assert found.interrupted is not None and lost <= {*found.undone}
+        assert found.fitted_after_n < found.fitted_before_n and "interrupted" in said(found)
+        assert found.as_json()["interrupted"]
+        written = replace(found, simulator="scikit-fem", began={}, settings=found.settings)
+        assert "n_per_m" in written.save(tmp_path / "x.py").read_text()
+    assert whole.interrupted is None
+
+
+@pytest.mark.slow
+def test_ctrl_c_writes_the_file_before_it_ends_the_program(ticking, bench, tmp_path, monkeypatch):
+    """Called from Python: the command says all, writes, and then ends as any that is interrupted."""
+    recording, model = bench.record(law="linear")
+    file = tmp_path / "settings.xml"
+    how = {"renderer": "mujoco", "save": file, "diagnosed": False, "shapes": False, "progress": False}
+
+    def tuned_until(*args, **more):
+        Ticking.ends_at = Ticking.clock_s + 0.1
+        return tuned(*args, **more)
+
+    monkeypatch.setattr("palpate.diagnosis.other_simulator.tuned.tuned", tuned_until)
+    monkeypatch.setattr("palpate.exporting.settings.write_settings", lambda path, found: path.write_text("x"))
+    with pytest.raises(KeyboardInterrupt):
+        pp.tune(recording, model, **how)
+    assert file.read_text() == "x"
+
+
 def test_what_only_another_modulus_would_hide_is_said(springs):
     """A force half as large again everywhere, which no setting may reach."""
     runs = Runs("springs", RenderOptions())
