@@ -122,7 +122,7 @@ def _answer(made: Export, refused: pp.PalpateError, said: Mapping[str, Any]) -> 
     option = getattr(refused, "option", None)
     if (named := re.search(r"--(simulated-axes|simulated-unit|modulus) ", str(refused))) is not None:
         option = named[1]
-    answer = made.traits.get("answers", {}).get(option)
+    answer = made.traits.get("answers", {}).get(str(option))
     return {} if answer is None or said.get(option) == answer else {str(option): answer}
 
 

@@ -85,9 +85,9 @@ def press_curves(ax: Axes, result: Comparison, press: int) -> None:
     forces = {"measured": presses.force, **{name: result.predicted[name] for name in ("fem", *RIVALS)}}
     for name, force in forces.items():
         here = local(presses, force)[rows]
-        style = {"color": colour_of(name), "lw": 1.8 if name == "measured" else 1.2}
-        ax.plot(depth, here[:, 0], label=called(name), **style)
-        ax.plot(depth, here @ along, ls="--", **style)
+        colour, width = colour_of(name), 1.8 if name == "measured" else 1.2
+        ax.plot(depth, here[:, 0], label=called(name), color=colour, lw=width)
+        ax.plot(depth, here @ along, ls="--", color=colour, lw=width)
     ax.plot([], [], color=COLOURS["reference"], ls="--", lw=1.2, label="dashed: sideways")
     ax.set(xlabel="depth [mm]", ylabel="force, into the surface and sideways [N]", title=f"press {press + 1}")
     ax.legend(frameon=False, fontsize=8.5)
