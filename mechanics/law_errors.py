@@ -24,8 +24,8 @@ _PLANNING = f"{_SET}; it ranks touches that are still to be made (docs/decisions
 _SIMULATOR = f"{_SET}; names were tested on sealed flaws with it (`palpate bench simulated`)"
 _PIECES = f"{_SET}, for a machine's curves at the size of a hand (docs/decisions/0120)"
 _CONTROLS = (
-    "fitted to levels and bends of 21 sound objects of the laboratory; within 95 % of what 72 say "
-    "(`palpate bench places`)"
+    "within 95 % of what 74 sound objects of the laboratory say: 0.7 to 1 of the bound, 0.4 to 1.2 of the "
+    "surface's error (`palpate bench places`)"
 )
 _BOUND = "fitted to solved presses at places of known shapes (`palpate bench law-bound`)"
 
@@ -73,7 +73,7 @@ class Stiffness:
         "place", _DIAGNOSIS,
     )  # fmt: skip
     bound = OwnError(
-        1.4, "1", "stiffness of a place that is not solved, in standard deviations of the law's bound there",
+        0.8, "1", "stiffness of a place that is not solved, in standard deviations of the law's bound there",
         "place", _CONTROLS,
     )  # fmt: skip
     simulator = OwnError(
@@ -88,7 +88,7 @@ class Stiffness:
         "together (`palpate bench press-solver --convergence`)",
     )  # fmt: skip
     surface = OwnError(
-        0.75, "1", "relative stiffness a unit of the surface's error over the object's height", "place",
+        1.0, "1", "relative stiffness a unit of the surface's error over the object's height", "place",
         _CONTROLS,
     )  # fmt: skip
     running_surface = OwnError(
