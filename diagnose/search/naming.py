@@ -92,8 +92,8 @@ class Score:
 
     @property
     def by_one_place(self) -> bool:
-        """Whether one place alone speaks for it."""
-        return float(self.per_group.sum() - self.per_group.max()) <= 0
+        """Whether one place alone speaks for it: the others gain less than the choice of a place costs."""
+        return float(self.per_group.sum() - self.per_group.max()) <= np.log(len(self.per_group))
 
     @property
     def log_odds(self) -> float:

@@ -86,7 +86,8 @@ def test_rivals_are_told_apart_by_what_each_adds_to_the_other(adds, lacks, left)
 
 def test_a_lump_that_one_place_alone_speaks_for_is_known_as_such():
     assert score("inclusion", [20.0] + [-0.1] * 39).by_one_place
-    assert not score("inclusion", [20.0, 5.0] + [-0.1] * 38).by_one_place
+    assert score("inclusion", [45.0, 2.0] + [0.0] * 38).by_one_place
+    assert not score("inclusion", [20.0, 9.0] + [-0.1] * 38).by_one_place
 
 
 def test_a_gap_smaller_than_what_matters_is_not_closed_by_less():
