@@ -119,11 +119,11 @@ def outcome_of(made: Export) -> str:
 
 def _answer(made: Export, refused: pp.PalpateError, said: Mapping[str, Any]) -> dict[str, Any]:
     """What the owner says to a question, by option; {} where nothing is asked, or it was said before."""
-    option = getattr(refused, "option", None)
+    option = str(getattr(refused, "option", None))
     if (named := re.search(r"--(simulated-axes|simulated-unit|modulus) ", str(refused))) is not None:
         option = named[1]
-    answer = made.traits.get("answers", {}).get(str(option))
-    return {} if answer is None or said.get(option) == answer else {str(option): answer}
+    answer = made.traits.get("answers", {}).get(option)
+    return {} if answer is None or said.get(option) == answer else {option: answer}
 
 
 def _curves(made: Export, said: Mapping[str, Any]) -> bool | None:

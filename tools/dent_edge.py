@@ -184,7 +184,9 @@ def fit(found: list[Pressed], part: str) -> tuple[np.ndarray, float, float]:
     def left(numbers: np.ndarray) -> np.ndarray:
         amounts, alike = given.copy(), (part == BASE) * numbers[-1] / RADIUS_M
         amounts[free] = numbers[:-1]
-        return np.concatenate([np.log(one.by_law(*amounts, alike=alike) / one.force) for one in found])[known]
+        compliance, bracing, curvature = amounts
+        forces = [one.by_law(compliance, bracing, curvature, alike) / one.force for one in found]
+        return np.log(np.concatenate(forces))[known]
 
     start = np.zeros(free.sum() + 1)
     solved = least_squares(left, start, x_scale="jac", loss="soft_l1", f_scale=_FAR_OFF)
