@@ -303,7 +303,7 @@ def _judged(
 def _verdict(world: _Reality, forces: Forces, stated: Stated, base: Base | None = None) -> SimulatedGap:
     """What is said, of nothing but the forces and what the simulation was given; and of its base."""
     return diagnose_simulated(
-        world.recording, world.model, Asked(forces, stated, ForcesOptions(clock_offset_s=0.0), base),
+        world.recording, world.model, Asked(forces, stated, ForcesOptions(clock_offset_s=0.0), base=base),
         DiagnoseOptions(bootstrap=100), reality=world.diagnosis, attribution=AttributionOptions(most=2),
     )  # fmt: skip
 

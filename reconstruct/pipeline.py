@@ -45,7 +45,7 @@ from palpate.reconstruction.steps.s2_base import Boundary
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import explore_points, is_points
-from palpate.reconstruction.steps.s3_contacts.sliding_presses import laid
+from palpate.reconstruction.steps.s3_contacts.sliding_presses import FLAT, laid
 from palpate.reconstruction.steps.s4_surface import (
     CastPoints,
     Surface,
@@ -189,7 +189,7 @@ def measure(recording: Recording, geometry: GeometryOptions, method: Method) -> 
             boundary=base,
             spans=samples.spans,
             unbroken=geometry.known,
-            flat=geometry.half_space or geometry.slab_m is not None,
+            flat=geometry.kind in FLAT,
         )
 
     if geometry.known:

@@ -179,19 +179,20 @@ def fit(found: list[Pressed], part: str) -> tuple[np.ndarray, float, float]:
     _, over_base, *amounts = fitted()
     given = np.stack(amounts)
     free = (given != 0) & (given[2] == 0) & (over_base == (part == BASE))
+    count = int(free.sum())
     known = np.isfinite(np.concatenate([one.force for one in found]))
 
     def left(numbers: np.ndarray) -> np.ndarray:
-        amounts, alike = given.copy(), (part == BASE) * numbers[-1] / RADIUS_M
-        amounts[free] = numbers[:-1]
+        amounts, alike = given.copy(), float(numbers[count:].sum()) / RADIUS_M
+        amounts[free] = numbers[:count]
         compliance, bracing, curvature = amounts
         forces = [one.by_law(compliance, bracing, curvature, alike) / one.force for one in found]
         return np.log(np.concatenate(forces))[known]
 
-    start = np.zeros(free.sum() + 1)
+    start = np.zeros(count + (part == BASE))
     solved = least_squares(left, start, x_scale="jac", loss="soft_l1", f_scale=_FAR_OFF)
-    given[free] = solved.x[:-1]
-    before, after = (float(np.sqrt((left(x) ** 2).mean())) for x in (start, np.append(solved.x[:-1], 0.0)))
+    given[free] = solved.x[:count]
+    before, after = (float(np.sqrt((left(x) ** 2).mean())) for x in (start, solved.x[:count]))
     return given, before, after
 
 

@@ -54,18 +54,18 @@ class Base:
 
 @dataclasses.dataclass(frozen=True)
 class Asked:
-    """What is asked of a simulation: its forces, what it was given, how the file is meant, the base that it
-    is judged against; of one run
-    here its version, advice by numerical effect, settings in words, and greatest Poisson's ratio."""
+    """What is asked of a simulation: its forces, what it was given, how the file is meant; of one run here
+    its version, advice by numerical effect, settings in words, and greatest Poisson's ratio; the base that it
+    is judged against."""
 
     forces: Forces
     stated: Stated
     options: ForcesOptions = dataclasses.field(default_factory=ForcesOptions)
-    base: Base | None = None
     version: str = ""
     advice: dict[str, str] = dataclasses.field(default_factory=dict)
     run_as: str = ""
     poisson_limit: float = math.inf
+    base: Base | None = None
 
 
 def diagnose_simulated(

@@ -193,6 +193,7 @@ def tuned(
 
     off(runs, start, judged.fitted, _named(by_clock, "how it is off before"))
     pressed = _Pressed(runs, judged)
+    asked = tuple(pressed.parts)
     share = (clock() - begun) / within_s
     before = pressed.off(
         start, "before", until(progress, begun, within_s, share + JUDGED * (1 - share), clock)
@@ -221,7 +222,7 @@ def tuned(
 
         after = pressed.off(best.values, "after", by_clock, fits)
     interrupted = interrupted or pressed.interrupted
-    lost = [name for name in _Pressed(runs, judged).parts if name not in after]
+    lost = [name for name in asked if name not in after]
     given = adapter.stated["young_modulus_pa"]
     dear = [] if search.budget.over(best) == 1.0 else ["nothing that was tried costs as little as was asked"]
     ended = list(dict.fromkeys(why for sums in (best.sums, *after.values()) for why in sums.ended))

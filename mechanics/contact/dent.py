@@ -230,7 +230,7 @@ def ellipse_curvature(principal: np.ndarray, tip_radius_m: float) -> np.ndarray:
     Fitted to the elliptic integrals, within 0.2 % of the mean relative curvature up to a ratio of ten.
     """
     mean, half = principal.mean(axis=1), 0.5 * np.ptp(principal, axis=1)
-    relative = np.maximum(1.0 / tip_radius_m + mean, 0.25 / tip_radius_m)
+    relative = 1.0 / effective_radius(tip_radius_m, mean)
     q = np.minimum(half / relative, 1.0) ** 2
     return mean - relative * q * (2 / 3 + 0.13 * q + 0.09 * q**2)
 

@@ -17,6 +17,7 @@ from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.geometry.stated import GeometryOptions, nowhere, stated_geometry
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.quasi_static import is_points
+from palpate.reconstruction.steps.s3_contacts.sliding_presses import FLAT
 from palpate.words import listed
 
 _PRESSES = 4
@@ -66,8 +67,7 @@ def ask_of_presses(recording: Recording, geometry: GeometryOptions) -> None:
     """Raise Unclear where presses of something flat speak against the sphere that was assumed; elsewhere the
     object's own shape has a part in how the force grows."""
     known = stated_geometry(recording, geometry)
-    flat = known.half_space or known.slab_m is not None
-    if not (flat and recording.tip_assumed) or is_points(recording):
+    if not (known.kind in FLAT and recording.tip_assumed) or is_points(recording):
         return
     try:
         found = explore(recording, boundary=nowhere(recording), unbroken=True).presses

@@ -196,7 +196,7 @@ def diagnose(
 
             if forces is not None:
                 base = None if best is None else Base(best, stated_of({}, made))
-                simulation = Asked(forces, stated_of(stated, made), of_forces, base)
+                simulation = Asked(forces, stated_of(stated, made), of_forces, base=base)
                 result = diagnose_simulated(measured, made, simulation, options, rest, **rules)
             else:
                 assert renderer is not None
@@ -307,7 +307,7 @@ def _simulations(
         forces = Forces(measured.t, ran.force, each.name, notes, chosen)
         # what the adapter gave it, but for what is said
         stated = stated_of({**ran.adapter.stated, **stated_values(given)}, each.model)
-        of_adapter = None, ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
+        of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
         plain = replace(of_forces, clock_offset_s=0.0, simulated_axes=AS_RECORDED, simulated_unit="N")
         simulations.append(Asked(forces, stated, plain, *of_adapter))
     return simulations

@@ -254,7 +254,7 @@ def _named(
     plain = ForcesOptions(clock_offset_s=0.0, simulated_axes=AS_RECORDED, simulated_unit="N")
     asked = Asked(
         Forces(measured.t, force, runs.name, (), chosen), stated_of(adapter.stated, made), plain,
-        None, adapter.version, adapter.advice, "", adapter.poisson_limit,
+        adapter.version, adapter.advice, "", adapter.poisson_limit,
     )  # fmt: skip
     try:
         found_gap = diagnose_simulated(

@@ -132,7 +132,7 @@ def test_a_simulator_that_is_off_already_is_judged_against_its_best(world):
     base = Base(forces(1.5 * law), stated)
 
     def judged_against(base, local):
-        asked = Asked(forces(local), stated, OWN_CLOCK, base)
+        asked = Asked(forces(local), stated, OWN_CLOCK, base=base)
         return diagnose_simulated(*world[:2], asked, FAST, reality=world[2])
 
     alone = judged_against(None, 0.5 * law + soft)

@@ -14,6 +14,7 @@ from palpate.diagnosis.explore.explorer import Explorer
 from palpate.diagnosis.explore.goals import GoalOptions, GoalState, surface_error
 from palpate.diagnosis.explore.segments import Instrument, Segment, join, split
 from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.reconstruction.steps.s5_mesh.meshing import mesh_surface
 from palpate.robot import segment_of, serve
 
 from ...reconstruct.exploration_of_cylinder import explore_cylinder
@@ -227,8 +228,18 @@ def test_touches_that_were_off_widen_what_a_surface_says_of_itself():
 
 
 @pytest.mark.slow
-def test_an_exploration_goes_on_as_sure_as_it_ended():
+def test_an_exploration_goes_on_as_sure_as_it_ended(monkeypatch):
     """What its last touches said of the surface was forgotten: it went on surer than it had stopped."""
+    meshed: dict[bytes, object] = {}
+
+    def once(surface, options):
+        # each mesh of one surface moves an end of so wide an interval by a twentieth
+        key = surface.vertices.tobytes()
+        if key not in meshed:
+            meshed[key] = mesh_surface(surface, options)
+        return meshed[key]
+
+    monkeypatch.setattr("palpate.diagnosis.explore.estimate.mesh_surface", once)
     instrument, segments = split(explore_cylinder()[0])
     explorer = Explorer(instrument)
     for segment in segments[:7]:
@@ -236,8 +247,7 @@ def test_an_exploration_goes_on_as_sure_as_it_ended():
     ended, goes_on = explorer.state, Explorer.going_on(explorer.recording).state
     assert goes_on.presses == ended.presses and explorer._tests
     assert goes_on.surface_error_m == pytest.approx(ended.surface_error_m, rel=1e-3)
-    # an end of so wide an interval moves by a tenth with what the last touches weigh
-    np.testing.assert_allclose(goes_on.modulus_ci95_pa, ended.modulus_ci95_pa, rtol=0.15)
+    np.testing.assert_allclose(goes_on.modulus_ci95_pa, ended.modulus_ci95_pa, rtol=0.05)
 
 
 def test_a_robot_in_the_laboratory_presses_as_fast_and_as_long_as_it_is_told():
