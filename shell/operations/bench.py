@@ -6,6 +6,7 @@ They are in the folder `benchmarks` of a clone of the project: run the command i
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
 import sys
 from collections.abc import Sequence
@@ -83,6 +84,8 @@ def bench(
     if name not in names():
         raise OptionError(unknown(name, "benchmark", names()))
     sys.path.insert(0, str(clone()))
+    inherited = os.environ.get("PYTHONPATH")  # processes of its own find the benchmarks too
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(clone()), inherited]))
     module = importlib.import_module(f"benchmarks.{name.replace('-', '_')}")
     parser = OneLineParser(prog=f"palpate bench {name}", description=module.__doc__)
     module.add_arguments(parser)

@@ -61,3 +61,18 @@ def test_every_benchmark_has_help(monkeypatch, capsys):
             cli.main(["bench", name, "--help"])
         assert end.value.code == 0
         assert "--evidence" in capsys.readouterr().out, name
+
+
+def test_a_process_of_its_own_finds_the_benchmarks_too(monkeypatch, tmp_path):
+    monkeypatch.chdir(CLONE)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    seen = tmp_path / "seen"
+
+    def run(_):
+        words = [sys.executable, "-P", "-c", "import benchmarks.evidence as e; print(e.__file__)"]
+        seen.write_text(subprocess.run(words, cwd=tmp_path, capture_output=True, text=True).stdout)
+        return {"figures": []}
+
+    monkeypatch.setattr("benchmarks.contacts.run", run)
+    assert cli.main(["bench", "contacts"]) == 0
+    assert seen.read_text().startswith(str(CLONE))
