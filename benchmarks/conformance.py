@@ -1,10 +1,10 @@
 """The conformance kit: its truth beside the virtual laboratory, its flaws' scores, and simulators' scores.
 
-The laboratory is another code with another mesh: it presses the same bodies by the same depths at small
-strains, its tip sticking, and then moves it sideways as far as the shipped solution does, from which the
-slides are made (`truth`). Told is its force over the shipped one of that law, and how much of the bound that
-is; sideways against the share of the force that the bound holds for slides. Forces of simulators are those
-that the kit's adapters wrote, each in a folder of its name.
+The laboratory is another code with another mesh inside the kit's own boundary: it presses the bodies by the
+same depths at small strains, its tip sticking, and then moves it sideways as far as the shipped solution
+does, from which the slides are made (`truth`). Told is its force over the shipped one of that law, and how
+much of the bound that is; sideways against the share of the force that the bound holds for slides. Forces of
+simulators are those that the kit's adapters wrote, each in a folder of its name.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._known_shapes import SHAPES
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.output import progress_bar
@@ -38,9 +37,10 @@ from palpate.scenes.conformance.cases import (
 from palpate.scenes.conformance.flaws import FLAWS
 from palpate.scenes.conformance.kit import write_kit
 from palpate.scenes.conformance.truth import alone
+from palpate.scenes.laboratory.mesh import boundary_faces
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
 from palpate.scenes.laboratory.surface import Surface
-from palpate.scenes.phantoms import Phantom, column, rectangle, stacked
+from palpate.scenes.phantoms import Phantom
 
 FINENESS = Fineness(1.2, 6.0, 0.45)
 """Of the laboratory's mesh: some 0.4 radii of the contact."""
@@ -159,13 +159,9 @@ def beside_laboratory(bodies: list[Body]) -> list[Figure]:
 def in_laboratory(body: Body) -> np.ndarray:
     """(depths + 1, 3) N on a tip that sticks, small strains, at SHARES of the body's depth, then STUCK of it
     along."""
-    if body.name == "slab":
-        vertices, faces = stacked(rectangle(0.16, 0.16), column(0.08, 0.008))
-    else:
-        shape = SHAPES[body.name]()
-        vertices, faces = shape.vertices, shape.triangles
-    thing = Phantom(body.name, body.name, vertices, faces, 1.0, POISSON)
     solved = body.solved
+    faces, _ = boundary_faces(solved.tetrahedra.astype(int))
+    thing = Phantom(body.name, body.name, solved.points, faces, 1.0, POISSON)
     at = Surface(1e3 * thing.vertices, thing.faces).nearest(1e3 * solved.place)[0][0]
     specimen = Specimen(POISSON, 1e3 * TIP_M)
     problem = build(thing, specimen, at, travel=0.0, fineness=FINENESS)

@@ -137,7 +137,7 @@ def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray
     folder = (cache or laboratory_cache()) / "meshes"
     path = folder / f"{surface_key(phantom)}-{COARSE_MM:g}.npz"
     if (kept := _kept(path)) is not None:
-        return kept
+        return _grounded(*kept)
     import pytetwild
     import pyvista
 
@@ -161,6 +161,20 @@ def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray
     points = _snap(points, tetrahedra, surface)
     with atomic_file(path) as temporary:
         np.savez(temporary, points=points, tetrahedra=tetrahedra)
+    return _grounded(points, tetrahedra)
+
+
+NEAR_SUPPORT_MM = 0.4
+"""Height of a corner that belongs to the foot, at most: the mesher may leave the surface by 0.2 % of the
+object's size, and thinning the surface leaves its plane too."""
+
+
+def _grounded(points: np.ndarray, tetrahedra: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same with the foot's corners on z = 0: a face of which one hangs above is no base, and not held."""
+    shell = np.unique(boundary_faces(tetrahedra)[0])
+    foot = shell[np.abs(points[shell, 2]) < NEAR_SUPPORT_MM]
+    points = points.copy()
+    points[foot, 2] = 0.0
     return points, tetrahedra
 
 

@@ -24,7 +24,7 @@ from palpate.scenes.laboratory.solver import Problem
 from palpate.scenes.laboratory.surface import Surface
 from palpate.scenes.phantoms import Phantom
 
-VERSION = 6
+VERSION = 7
 """Raised whenever solved curves would change."""
 
 

@@ -8,6 +8,7 @@ import trimesh
 
 from palpate.mechanics.errors import SceneError, SurfaceError
 from palpate.scenes.laboratory.hand import HandOptions
+from palpate.scenes.laboratory.mesh import graded_mesh
 from palpate.scenes.laboratory.presses import FLOOR_MM, RIM_MM, press_set
 from palpate.scenes.laboratory.surface import Surface
 from palpate.scenes.laboratory.tracing import foot_path, trace
@@ -104,3 +105,17 @@ def test_tracing_starts_and_ends_in_the_air_and_leans_less_than_allowed() -> Non
     assert radius.min() > 45.0 - 0.66
     assert radius.max() < 45.5
     assert traced.force[traced.contact][:, 2].max() > 0.3
+
+
+@pytest.mark.parametrize("name", PHANTOMS)
+def test_the_whole_foot_of_a_phantom_is_held(name: str) -> None:
+    thing = phantom(name)
+    mesh = graded_mesh(thing, np.array([0.0, 0.0, 1e3 * thing.height_m]), finest=4.0)
+    foot = _area(1e3 * thing.vertices, thing.faces[(thing.vertices[thing.faces, 2] < 1e-6).all(axis=1)])
+    # the rim of the coarse mesh is a polygon
+    assert _area(mesh.points, mesh.base[:, :3]) == pytest.approx(foot, rel=0.06)
+
+
+def _area(points: np.ndarray, faces: np.ndarray) -> float:
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
