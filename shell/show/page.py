@@ -136,7 +136,7 @@ class Page:
 
     def lead(self, text: str) -> None:
         """The answer, in large type."""
-        self._parts.append(f'<p class="lead">{self._words(text)}</p>')
+        self._parts.append(f'<p class="lead">{self._words(_UNIT.sub(NO_BREAK, text))}</p>')
 
     def paragraph(self, text: str) -> None:
         """Plain words; what stands between backticks is code."""
@@ -304,6 +304,11 @@ def scrolling(wide: str) -> str:
 @cache
 def file_text(name: str) -> str:
     return files("palpate.show").joinpath(name).read_text(encoding="utf-8")
+
+
+NO_BREAK = "\u00a0"
+_UNIT = re.compile(r"(?<=\d) (?=(?:[mkMG]?(?:N|Pa|Hz)|[mcµ]?m|[mµ]?s|m?N/mm?)\b)(?=[^`]*(?:`[^`]*`[^`]*)*$)")
+"""The space between a number and its unit, outside of what is marked as code."""
 
 
 def _words(text: str) -> str:

@@ -93,3 +93,10 @@ def test_a_file_is_named_as_one_would_type_it(monkeypatch, tmp_path):
     assert file_words(None, "REC") == "REC"
     assert file_words(tmp_path / "a" / "mine.csv", "REC") == str(Path("a") / "mine.csv")
     assert file_words(embedded_recording("silicone-1-cylinder"), "REC") == "silicone-1-cylinder"
+
+
+def test_no_line_breaks_between_a_number_and_its_unit(tmp_path: Path) -> None:
+    page = Page("x")
+    page.lead("It errs by 1.02 N, 3 mm deep, as `palpate press M --depth 3 mm` says")
+    text = page.write(tmp_path / "x.html").read_text(encoding="utf-8")
+    assert "1.02\u00a0N, 3\u00a0mm deep" in text and "--depth 3 mm</code>" in text
