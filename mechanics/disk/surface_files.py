@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.mechanics.disk.gmsh1 import is_gmsh1, read_gmsh1
 from palpate.mechanics.disk.holes import close
-from palpate.mechanics.disk.mesh_parts import Part, bodies, labels
+from palpate.mechanics.disk.mesh_parts import Part, bodies, labels, without_specks
 from palpate.mechanics.disk.overheard import overheard
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
@@ -128,6 +128,9 @@ def _closed(
             "cancel; a solid object is needed: mend it in the program that made the file",
             *given,
         )
+    if not labelled:
+        shell, dust = without_specks(shell)
+        notes += dust
     vertices = np.asarray(shell.vertices) * UNITS[unit]
     parts = labelled or bodies(shell, path, UNITS[unit])
     return ClosedSurface(vertices, np.asarray(shell.faces, dtype=np.int64), name, notes, parts)
