@@ -29,7 +29,8 @@ over that tip, and has no crease or support nearer than so many contact radii.""
 @dataclass(frozen=True)
 class Places:
     """points, normals (k, 3); thickness (k,) m along the inward normal; curvature (k,) 1/m, mean, convex
-    positive; creased (k,) m to the nearest crease or the support; tip_m of them all, depth_m (k,)."""
+    positive; creased (k,) m to the nearest surface of another direction, or the support; tip_m of them all,
+    depth_m (k,)."""
 
     points: np.ndarray
     normals: np.ndarray
@@ -70,16 +71,17 @@ def places_of(model: Model, count: int, seed: int = 5) -> Places:
     thickness = np.where(np.isfinite(under), under, 0.0)
     bends = shape.curvatures(points, normals, tip)[0].mean(axis=1) if len(points) else np.zeros(0)
     depth = np.clip(_DEPTH_SHARE * thickness, LEAST_M, min(DEEPEST_M, 0.4 * tip))
-    creased = np.minimum(_to_creases(shape, points, tip), model.support.height(points))
+    creased = np.minimum(_to_others(shape, points, normals), model.support.height(points))
     return Places(points, normals, thickness, bends, creased, tip, depth)
 
 
-def _to_creases(shape: TrueShape, points: np.ndarray, tip: float) -> np.ndarray:
-    """(k,) m to the nearest crease; inf without one."""
-    creases = shape.crease_points(tip / 4)
-    if not len(creases):
-        return np.full(len(points), np.inf)
-    return np.linalg.norm(points[:, None] - creases, axis=2).min(axis=1)
+def _to_others(shape: TrueShape, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(k,) m to the nearest surface that looks another way by more than 30 degrees: beyond a crease, or
+    where bodies cross."""
+    there, facing = shape.foot(sample(shape.vertices, shape.triangles, 6000, 0))
+    away = np.linalg.norm(points[:, None] - there, axis=2)
+    away[normals @ facing.T > np.cos(np.radians(30))] = np.inf
+    return away.min(axis=1) if len(points) else np.zeros(0)
 
 
 def renderer_of(model: Model) -> Renderer:
@@ -102,7 +104,11 @@ def pressed(
             )  # fmt: skip
     except PalpateError as error:
         return None, str(error)
-    return (None, "the support came first") if curve.on_support else (curve, "")
+    if curve.on_support:
+        return None, "the support came first"
+    first = curve.position[int(np.argmax(curve.depth > 0))]
+    off = float(np.linalg.norm(first - places.points[k] - tip * places.normals[k]))
+    return (curve, "") if off < 0.3 * tip else (None, "another place came first")
 
 
 def over_hertz(curve: Any, places: Places, k: int, model: Model) -> float:
