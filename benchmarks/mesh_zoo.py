@@ -139,15 +139,18 @@ def _volume_ratio(drawn: Drawn, model: Model, given: dict[str, Any]) -> float | 
     if meant is None or given.get("sink_m"):
         if not drawn.sound:
             return None
-        up = model.support.normal
-        cut = drawn.mesh.slice_plane(1e3 * model.support.point, up, cap=False)
-        meant = _over_plane(cut, 1e3 * model.support.point)
+        meant = _over_plane(drawn.mesh, 1e3 * model.support.point, model.support.normal)
     return volume / meant
 
 
-def _over_plane(mesh: Any, foot: np.ndarray) -> float:
-    """The volume between a cut surface and its cut: cones to a point of the cut add up to it."""
-    return abs(float(np.linalg.det(mesh.triangles - foot).sum()) / 6)
+def _over_plane(mesh: Any, foot: np.ndarray, up: np.ndarray) -> float:
+    """mm^3 of a closed mesh over a plane: cones from a point of the plane to what is left of its triangles."""
+    import pyvista
+
+    whole = pyvista.PolyData.from_regular_faces(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    left = whole.clip(normal=tuple(up), origin=tuple(foot), invert=False).triangulate()
+    corners = np.asarray(left.points, dtype=float)[left.regular_faces] - foot
+    return abs(float(np.linalg.det(corners).sum()) / 6)
 
 
 def _judge(found: dict[str, Any]) -> None:

@@ -54,17 +54,44 @@ def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> Close
         )
     except MeshError as error:
         raise refused from error
-    faces = cells[:, FACES].reshape(-1, 3)[lone_faces(cells)]
-    used, faces = np.unique(faces, return_inverse=True)
-    shell = trimesh.Trimesh(points[used], faces.reshape(-1, 3), process=False)
-    near = distance(shell.vertices, shell.faces, sample(vertices, triangles, 1000)) < _NEAR * diagonal
-    if near.mean() < _FOLLOWED or shell.volume < _SOLID * np.prod(np.ptp(vertices, axis=0)):
+    shell = trimesh.Trimesh(*_boundary(points, cells), process=False)
+    there = sample(vertices, triangles, 1000)
+    near = distance(shell.vertices, shell.faces, there) < _NEAR * diagonal
+    # walls between bodies that touch, and sheets inside of one, are no surface of it
+    near |= _inside(shell, there)
+    followed = near.mean() >= _FOLLOWED and shell.is_watertight
+    if not followed or shell.volume < _SOLID * np.prod(np.ptp(vertices, axis=0)):
         raise refused
     reason = str(refused).removeprefix(f"'{refused.name}' ").split("; ")[0]
     note = f"it {reason}; filled by its winding number, {1e6 * shell.volume:.4g} cm³"
     return ClosedSurface(
         np.asarray(shell.vertices), np.asarray(shell.faces, dtype=np.int64), refused.name, (note,)
     )
+
+
+def _inside(shell: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
+    """(k,) bool, of points (k, 3)."""
+    import pyvista
+
+    around = pyvista.PolyData.from_regular_faces(np.asarray(shell.vertices), np.asarray(shell.faces))
+    found = pyvista.PolyData(points).select_interior_points(around, check_surface=False)
+    return np.asarray(found["selected_points"], dtype=bool)
+
+
+def _boundary(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and outward triangles of tetrahedra (m, 4). Where they meet in an edge or a corner alone, each
+    side has vertices of its own, so that every edge belongs to two triangles."""
+    corners = np.arange(cells.size).reshape(cells.shape)
+    faces, owners = cells[:, FACES].reshape(-1, 3), corners[:, FACES].reshape(-1, 3)
+    order = np.argsort(faces, axis=1)
+    _, same = np.unique(np.take_along_axis(faces, order, 1), axis=0, return_inverse=True)
+    along, by_face = np.argsort(same.ravel(), kind="stable"), np.take_along_axis(owners, order, 1)
+    both = np.flatnonzero(np.diff(same.ravel()[along]) == 0)
+    ends = by_face[along[both]].ravel(), by_face[along[both + 1]].ravel()
+    graph = coo_matrix((np.ones(len(ends[0])), ends), shape=(cells.size, cells.size))
+    one = connected_components(graph, directed=False)[1]
+    used, triangles = np.unique(one[owners[lone_faces(cells)]], return_inverse=True)
+    return points[cells.ravel()[np.unique(one, return_index=True)[1]]][used], triangles.reshape(-1, 3)
 
 
 def _sewn(refused: NotClosedError, reach_m: float, up: np.ndarray | None) -> ClosedSurface | None:

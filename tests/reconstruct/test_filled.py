@@ -8,6 +8,7 @@ import trimesh
 
 from palpate.mechanics.errors import NotClosedError
 from palpate.mechanics.shape.flat_foot import standing
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.reconstruction.geometry import filled
 from palpate.reconstruction.geometry.filled import solid_of
 
@@ -15,7 +16,7 @@ from palpate.reconstruction.geometry.filled import solid_of
 @pytest.mark.slow
 def test_a_soup_is_filled_and_stands():
     """Every triangle by itself, its corners off by tenths of a millimetre."""
-    block = trimesh.creation.box(extents=(0.06, 0.05, 0.04)).subdivide()
+    block = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
     corners = np.array(block.triangles).reshape(-1, 3)
     corners += np.random.default_rng(2).normal(0, 4e-5, corners.shape)
     soup = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
@@ -39,6 +40,27 @@ def test_corners_apart_by_rounding_are_joined_without_the_mesher(monkeypatch):
     assert len(found.triangles) == len(block.faces) and "joined" in found.notes[0]
     solid = trimesh.Trimesh(found.vertices, found.triangles, process=False)
     assert solid.volume == pytest.approx(block.volume, rel=1e-3)
+
+
+def test_tetrahedra_that_meet_in_an_edge_alone_have_a_closed_boundary_each():
+    left = box_mesh((2, 2, 2), (0.03, 0.03, 0.03))
+    points = np.vstack([left.points, left.points + [0.03, 0.03, 0]])
+    places, merged = np.unique(np.round(points, 9), axis=0, return_inverse=True)
+    cells = merged.ravel()[np.vstack([left.tetrahedra, left.tetrahedra + len(left.points)])]
+    shell = trimesh.Trimesh(*filled._boundary(places, cells), process=False)
+    assert shell.is_watertight and shell.is_winding_consistent
+    assert shell.volume == pytest.approx(2 * 0.03**3)
+
+
+@pytest.mark.slow
+def test_a_wall_between_bodies_that_touch_is_no_reason_to_refuse():
+    left, right = (trimesh.creation.box(extents=(0.03, 0.04, h)) for h in (0.03, 0.045))
+    right.apply_translation([0.03, 0, 0.0075])
+    both = trimesh.util.concatenate([left, right])
+    both.merge_vertices()
+    found = solid_of(both)
+    solid = trimesh.Trimesh(found.vertices, found.triangles, process=False)
+    assert solid.volume == pytest.approx(left.volume + right.volume, rel=0.01)
 
 
 def test_a_sheet_stays_refused():
