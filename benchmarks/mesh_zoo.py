@@ -144,7 +144,7 @@ def _volume_ratio(drawn: Drawn, model: Model, given: dict[str, Any]) -> float | 
 
 
 def _over_plane(mesh: Any, foot: np.ndarray, up: np.ndarray) -> float:
-    """mm^3 of a closed mesh over a plane: cones from a point of the plane to what is left of its triangles."""
+    """mm^3 of a closed mesh over a plane: cones from a point of it to what is left of the triangles."""
     import pyvista
 
     whole = pyvista.PolyData.from_regular_faces(np.asarray(mesh.vertices), np.asarray(mesh.faces))

@@ -15,10 +15,10 @@ from palpate.reconstruction.geometry.filled import solid_of
 
 @pytest.mark.slow
 def test_a_soup_is_filled_and_stands():
-    """Every triangle by itself, its corners off by tenths of a millimetre."""
+    """Every triangle by itself, its corners off by more than rounding."""
     block = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
     corners = np.array(block.triangles).reshape(-1, 3)
-    corners += np.random.default_rng(2).normal(0, 4e-5, corners.shape)
+    corners += np.random.default_rng(2).normal(0, 2e-5, corners.shape)
     soup = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
     found = solid_of(soup)
     solid = trimesh.Trimesh(found.vertices, found.triangles, process=False)
