@@ -23,19 +23,21 @@ _HERTZ_SHARE, _HERTZ_RADII = 0.4, 0.1
 """Of the tip by which Hertz is asked; and how deep, radii."""
 _THICK, _GENTLE, _RIM = 75.0, 0.1, 6.0
 """Hertz applies where the object is so many times thicker than that contact is wide, bends by less than this
-over that tip, and has no crease or support nearer than so many contact radii."""
+over that tip, has no crease or support nearer than so many contact radii, and is pressed towards its support
+within 30 degrees: pressed on its side a body of 30 mm bends, which takes a tenth off."""
 
 
 @dataclass(frozen=True)
 class Places:
     """points, normals (k, 3); thickness (k,) m along the inward normal; curvature (k,) 1/m, mean, convex
-    positive; creased (k,) m to the nearest surface of another direction, or the support; tip_m of them all,
-    depth_m (k,)."""
+    positive; upright (k,) cosine between the normal and the support's; creased (k,) m to the nearest surface
+    of another direction, or the support; tip_m of them all, depth_m (k,)."""
 
     points: np.ndarray
     normals: np.ndarray
     thickness: np.ndarray
     curvature: np.ndarray
+    upright: np.ndarray
     creased: np.ndarray
     tip_m: float
     depth_m: np.ndarray
@@ -51,7 +53,8 @@ class Places:
         tip = self.hertz_tip_m
         contact = tip * np.sqrt(_HERTZ_RADII)
         thick, far = self.thickness > _THICK * contact / 2, self.creased > _RIM * contact
-        return thick & far & (np.abs(self.curvature) * tip < _GENTLE)
+        upright = self.upright > np.cos(np.radians(30))
+        return upright & thick & far & (np.abs(self.curvature) * tip < _GENTLE)
 
 
 def places_of(model: Model, count: int, seed: int = 5) -> Places:
@@ -72,7 +75,7 @@ def places_of(model: Model, count: int, seed: int = 5) -> Places:
     bends = shape.curvatures(points, normals, tip)[0].mean(axis=1) if len(points) else np.zeros(0)
     depth = np.clip(_DEPTH_SHARE * thickness, LEAST_M, min(DEEPEST_M, 0.4 * tip))
     creased = np.minimum(_to_others(shape, points, normals), model.support.height(points))
-    return Places(points, normals, thickness, bends, creased, tip, depth)
+    return Places(points, normals, thickness, bends, normals @ up, creased, tip, depth)
 
 
 def _to_others(shape: TrueShape, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
