@@ -11,7 +11,7 @@ TEN = (
     "block of 10 mm",
     "cylinder",
     "plate of 6 mm",
-    "cube of three layers",
+    "two blocks touching",
     "dome, scanned on a table",
     "dome, inside out",
     "dome, triangles of no area",

@@ -388,6 +388,22 @@ def test_bodies_inside_or_beside_one_another_are_listed_with_their_volumes(tmp_p
     assert read_surface(written(tmp_path, "one.obj"), "mm").parts == ()
 
 
+def test_bodies_that_share_a_face_are_joined_and_a_surface_of_two_sides_is_one(tmp_path):
+    layers = [trimesh.creation.box(extents=(0.05, 0.05, 0.015)) for _ in range(3)]
+    layers[1].apply_scale([1, 1, -1])  # the same diagonals on both sides of a wall, as a mesher leaves it
+    for k, layer in enumerate(layers):
+        layer.apply_translation([0, 0, 0.015 * k])
+    trimesh.util.concatenate(layers).export(tmp_path / "layers.stl")
+    found = read_surface(tmp_path / "layers.stl")
+    assert volume(found) == pytest.approx(0.05 * 0.05 * 0.045, rel=1e-5)
+    assert "bodies that touch joined" in found.notes and not found.parts
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.03)
+    both = np.vstack([ball.faces, ball.faces[:, ::-1]])
+    trimesh.Trimesh(ball.vertices, both, process=False).export(tmp_path / "twice.stl")
+    found = read_surface(tmp_path / "twice.stl")
+    assert volume(found) == pytest.approx(ball.volume, rel=1e-5)
+
+
 def test_specks_beside_a_body_are_left_out_and_said_and_a_small_part_inside_stays(tmp_path):
     def read(*shells):
         trimesh.util.concatenate(shells).export(tmp_path / "dusty.ply")
