@@ -74,7 +74,8 @@ def extruded(outline: Sequence[tuple[float, float]], height: float, lying: bool 
     low = np.column_stack([flat, np.zeros(count)])
     number = np.arange(count)
     lines = np.column_stack([np.full(count, 2), number, np.roll(number, -1)])
-    lid = pyvista.PolyData(low, lines=lines.ravel()).triangulate_contours().regular_faces
+    flat_lid = pyvista.PolyData(low, lines=lines.ravel()).triangulate_contours()
+    lid: np.ndarray = np.asarray(flat_lid.regular_faces)
     nxt = np.roll(number, -1)
     walls = np.vstack(
         [np.column_stack([number, nxt, nxt + count]), np.column_stack([number, nxt + count, number + count])]
