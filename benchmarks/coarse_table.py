@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.mesh_zoo import organ
+from benchmarks._zoo_shapes import organ
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance, first_places
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.stored_compliance import load_or_condense, load_or_solve

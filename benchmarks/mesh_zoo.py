@@ -1,227 +1,222 @@
-"""Meshes as people have them, drawn by a script: how many become a model of the object, how many are refused.
+"""Meshes as people have them, drawn by a script: how many become a model that presses right.
 
-Each file is given to `palpate model` as somebody would who never saw it; where that is refused, the flags
-that the refusal names are taken, once or twice. A model is right where its volume is within 5 % of the
-object's.
+Each of 60 files is given to `pp.model_of` as somebody would who never saw it; where that is refused, what the
+refusal names is taken, twice at most. The model's volume is held against the object's; then it is made once
+more with tetrahedra of half the size (nearly, where that takes too much work), and both are pressed at the
+same places (benchmarks._zoo_presses): against one another, against Hertz where that applies, and against the
+solver of a press.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
-import subprocess
-import sys
 import tempfile
+import time
+import traceback
+import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
-from benchmarks.evidence import rates
-from palpate.mechanics.model.files import read_model
+import palpate as pp
+from benchmarks._zoo_damage import BROKEN, SCANS
+from benchmarks._zoo_parts import PARTS, PHANTOMS
+from benchmarks._zoo_presses import compare
+from benchmarks._zoo_shapes import ORGANS, Drawn
+from benchmarks.evidence import Figure, rates
+from palpate.mechanics.errors import PalpateError
+from palpate.mechanics.model.model import Model
 
-_TOLERANCE, _CURES = 0.05, 2
-OUTCOMES = ("right", "right by the cure that was named", "refused", "wrong", "traceback")
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """A mesh in mm as its file has it, and the volume of the object that it means, mm^3; None: not known."""
-
-    mesh: trimesh.Trimesh
-    volume_mm3: float | None
-    flags: tuple[str, ...] = ()
-
-
-def _dome(radius: float = 30.0, height: float = 40.0) -> trimesh.Trimesh:
-    """A half ellipsoid whose flat foot lies on z = 0."""
-    angle = np.linspace(0, np.pi / 2, 25)
-    profile = np.column_stack([radius * np.cos(angle), height * np.sin(angle)])
-    profile[-1, 0] = 0.0
-    foot = np.column_stack([np.linspace(0, radius, 8)[:-1], np.zeros(7)])
-    return trimesh.creation.revolve(np.vstack([foot, profile]), sections=64)
-
-
-def organ(seed: int = 0) -> trimesh.Trimesh:
-    """A lumpy ellipsoid of 120 x 80 x 60 mm without a flat foot."""
-    ball = trimesh.creation.icosphere(subdivisions=4, radius=1.0)
-    random = np.random.default_rng(seed)
-    lumps = sum(
-        0.06 * np.sin(ball.vertices @ random.normal(0, 2.5, 3) + random.uniform(0, 6)) for _ in range(4)
-    )
-    ball.vertices = ball.vertices * (1 + lumps)[:, None] * [60, 40, 30]
-    return ball
-
-
-def _without(mesh: trimesh.Trimesh, gone: np.ndarray) -> trimesh.Trimesh:
-    mesh = mesh.copy()
-    mesh.update_faces(~gone)
-    mesh.remove_unreferenced_vertices()
-    return mesh
-
-
-def _scan() -> Drawn:
-    """A scan of a dome on a table: nothing below 2 to 5 mm was seen, and what was ends at `low`."""
-    dome = _dome()
-    x, _, z = dome.triangles_center.T
-    seen = _without(dome, z < 3.5 + 1.5 * np.sin(x / 8))
-    low = float(seen.bounds[0, 2])
-    return Drawn(seen, np.pi * 30**2 * ((40 - low) - (40**3 - low**3) / (3 * 40**2)))
-
-
-def _noisy() -> Drawn:
-    dome = _dome()
-    noisy = dome.copy()
-    up = noisy.vertices[:, 2] > 1e-6
-    noisy.vertices[up] += np.random.default_rng(1).normal(0, 0.15, (int(up.sum()), 3))
-    return Drawn(noisy, dome.volume)
-
-
-def _tilted(degrees: float) -> Drawn:
-    dome = _dome()
-    turned = dome.copy()
-    turned.apply_transform(trimesh.transformations.rotation_matrix(np.radians(degrees), [1, 0.4, 0]))
-    return Drawn(turned, dome.volume)
-
-
-def _flipped() -> Drawn:
-    dome = _dome()
-    faces = np.array(dome.faces)
-    faces[::3] = faces[::3, ::-1]
-    return Drawn(trimesh.Trimesh(dome.vertices, faces, process=False), dome.volume)
-
-
-def _inverted() -> Drawn:
-    dome = _dome()
-    dome.invert()
-    return Drawn(dome, abs(dome.volume))
-
-
-def _soup() -> Drawn:
-    """Every triangle by itself, its corners off by micrometres."""
-    dome = _dome()
-    corners = np.array(dome.triangles).reshape(-1, 3)
-    corners += np.random.default_rng(2).normal(0, 2e-3, corners.shape)
-    return Drawn(trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False), dome.volume)
-
-
-def _box(extents: tuple[float, ...], at: tuple[float, ...] = (0, 0, 0)) -> trimesh.Trimesh:
-    """Its foot's middle at `at`."""
-    box = trimesh.creation.box(extents=extents)
-    box.apply_translation(np.array(at) + [0, 0, extents[2] / 2])
-    return box
-
-
-def _together(meshes: list[trimesh.Trimesh]) -> trimesh.Trimesh:
-    both = trimesh.util.concatenate(meshes)
-    assert isinstance(both, trimesh.Trimesh)
-    return both
-
-
-def _crossing() -> Drawn:
-    """Two blocks that go through one another."""
-    both = _together([_box((80, 30, 30)), _box((30, 80, 40))])
-    return Drawn(both, 80 * 30 * 30 + 30 * 80 * 40 - 30 * 30 * 30)
-
-
-def _chest() -> Drawn:
-    """Two organs beside one another, one 12 mm higher."""
-    left, right = organ(3), organ(4)
-    left.apply_translation([70, 0, 0])
-    right.apply_translation([-70, 0, 12])
-    return Drawn(_together([left, right]), None)
-
-
-def _pierced() -> Drawn:
-    """A wide hole in the side."""
-    dome = _dome()
-    return Drawn(_without(dome, np.linalg.norm(dome.triangles_center - [28, 0, 15], axis=1) < 9), dome.volume)
-
-
-def _twisted() -> Drawn:
-    """A fan of three sheets at one edge stands in a block: that edge has three triangles."""
-    block = _box((60, 50, 40))
-    fin = trimesh.Trimesh(block.vertices[[1, 5, 3]] * 0.6 + [0, 0, 8], [[0, 1, 2]], process=False)
-    return Drawn(_together([block, fin]), block.volume)
-
-
-def _whole(mesh: trimesh.Trimesh, *flags: str) -> Drawn:
-    return Drawn(mesh, abs(float(mesh.volume)), flags)
-
-
-def _capped(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    mesh.apply_translation([0, 0, -mesh.bounds[0, 2]])
-    return mesh
-
-
-ZOO: dict[str, Callable[[], Drawn]] = {
-    "dome": lambda: _whole(_dome()),
-    "dome, scanned on a table": _scan,
-    "dome, noisy": _noisy,
-    "dome, tilted by 7.5 degrees": lambda: _tilted(7.5),
-    "dome, some triangles turned": _flipped,
-    "dome, inside out": _inverted,
-    "dome, a hole in its side": _pierced,
-    "dome, a soup": _soup,
-    "organ without a flat foot": lambda: Drawn(organ(), None),
-    "two organs": _chest,
-    "ball": lambda: Drawn(trimesh.creation.icosphere(subdivisions=4, radius=30), None),
-    "crossing blocks": _crossing,
-    "block with a fin": _twisted,
-    "plate of 6 mm": lambda: _whole(_box((60, 60, 6))),
-    "beam": lambda: _whole(_box((10, 10, 50))),
-    "tube": lambda: _whole(_capped(trimesh.creation.annulus(r_min=15, r_max=20, height=40))),
-    "ring lying": lambda: Drawn(trimesh.creation.torus(30, 10, major_sections=64), None),
-    "cone": lambda: _whole(trimesh.creation.cone(radius=30, height=50, sections=64)),
-    "capsule lying": lambda: Drawn(trimesh.creation.capsule(radius=20, height=60), None, ("--up", "+x")),
-    "block of 12 triangles, 250 mm": lambda: _whole(_box((250, 250, 250))),
-}
+ZOO: dict[str, Callable[[], Drawn]] = {**ORGANS, **PHANTOMS, **PARTS, **SCANS, **BROKEN}
+_VOLUME, _SIZES, _HERTZ, _CURES = 0.05, 0.02, 0.05, 2
+_MOST = 20_000
+"""Tetrahedra of the second mesh; where the first has nearly as many, a coarser one is taken."""
+OUTCOMES = (
+    "right",
+    "right by the cure that was named",
+    "refused, and the cure that was named is refused too",
+    "refused without a cure",
+    "wrong",
+    "traceback",
+)
+_TAKEN = {
+    "sink": ("sink_m", float), "mesh-size": ("mesh_size_m", float), "up": ("up", str), "unit": ("unit", str),
+    "modulus": ("young_modulus_pa", float),
+}  # fmt: skip
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """--only."""
+    """Which shapes, how many sizes and places."""
     parser.add_argument("--only", default="", help="shapes whose name holds this (default: all)")
+    parser.add_argument("--first", type=int, default=len(ZOO), help="so many of them (default: all)")
+    parser.add_argument("--sizes", type=int, choices=(1, 2), default=2, help="of the mesh (default: 2)")
+    parser.add_argument("--places", type=int, default=8, help="pressed on each; 0: none (default: 8)")
+    parser.add_argument("--solved", type=int, default=1, help="of them solved too (default: 1)")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """{"shapes": {name: outcome, flags, words, volume_ratio}, "figures"}."""
+    """{"shapes": {name: what became of it}, "figures"}; a line is printed for each shape."""
+    chosen = [name for name in ZOO if arguments.only in name][: arguments.first]
     shapes: dict[str, dict[str, Any]] = {}
     with tempfile.TemporaryDirectory() as folder:
-        for number, (name, draw) in enumerate(ZOO.items()):
-            if arguments.only in name:
-                shapes[name] = tried(draw(), Path(folder) / f"{number}")
-                print(f"{name:32} " + "  ".join(str(x) for x in shapes[name].values()), flush=True)
-    counts = {kind: sum(each["outcome"] == kind for each in shapes.values()) for kind in OUTCOMES}
-    figures = rates({kind: (count, len(shapes)) for kind, count in counts.items()})
-    return {"shapes": shapes, "figures": figures}
+        for name in chosen:
+            shapes[name] = one = tried(
+                ZOO[name](), Path(folder), arguments.sizes, arguments.places, arguments.solved
+            )
+            print(_line(name, one), flush=True)
+    return {"shapes": shapes, "figures": _figures(shapes)}
 
 
-def tried(drawn: Drawn, at: Path) -> dict[str, Any]:
-    """What becomes of one file, by command; `at`: a path without ending for the file and the model."""
-    path = at.with_suffix(".stl")
+def tried(drawn: Drawn, folder: Path, sizes: int = 2, places: int = 8, solved: int = 1) -> dict[str, Any]:
+    """What becomes of one file, meshed in one or two sizes and pressed."""
+    path, begun = folder / "shape.stl", time.process_time()
     drawn.mesh.export(path)
-    flags, tries = list(drawn.flags), 0
-    while True:
-        words = ["model", str(path), "--unit", "mm", *flags, "-o", f"{at}-model"]
-        done = subprocess.run(
-            [sys.executable, "-m", "palpate", *words], capture_output=True, text=True, check=False
-        )
-        said = done.stderr.strip()
-        found = {"outcome": "refused", "flags": " ".join(flags), "volume_ratio": None, "said": said}
-        if "Traceback" in said:
-            return found | {"outcome": "traceback"}
-        if done.returncode == 0:
-            break
-        cure = re.search(r"(--(?:sink|mesh-size|up))[ =]([-+\w.,]+)", said.split(";")[-1].split(" or ")[-1])
-        if cure is None or tries == _CURES:
-            return found
-        flags, tries = [*flags, *cure.groups()], tries + 1
-    volume = float(read_model(f"{at}-model").mesh.volumes.sum()) * 1e9
-    whole = drawn.volume_mm3
-    ratio = None if whole is None else round(volume / whole, 4)
-    right = ratio is None or abs(ratio - 1) < _TOLERANCE
-    outcome = ("right by the cure that was named" if tries else "right") if right else "wrong"
-    return found | {"outcome": outcome, "volume_ratio": ratio}
+    found: dict[str, Any] = {"outcome": "", "given": {}, "said": "", "wrong": []}
+    try:
+        model = _modelled(path, drawn, found)
+        if model is not None:
+            models = [model, *[_other(path, found["given"], model)] * (sizes - 1)]
+            found |= {"sizes_mm": [1e3 * each.mesh_size_m for each in models]}
+            found |= {"volume_ratio": _volume_ratio(drawn, model, found["given"])}
+            if places:
+                found |= compare(models, places, solved)
+            _judge(found)
+    except PalpateError as error:
+        found |= {"outcome": OUTCOMES[3], "said": str(error)}
+    except Exception:
+        found |= {"outcome": "traceback", "said": traceback.format_exc()[-600:]}
+    return found | {"cpu_s": round(time.process_time() - begun, 1)}
+
+
+def _modelled(path: Path, drawn: Drawn, found: dict[str, Any]) -> Model | None:
+    """The model, by the cures that refusals name; None where it stays refused."""
+    given: dict[str, Any] = {"unit": drawn.unit, "up": drawn.up}
+    for tries in range(_CURES + 1):
+        try:
+            with warnings.catch_warnings(record=True) as heard:
+                warnings.simplefilter("always")
+                model = pp.model_of(path, **given)
+            found |= {"given": given, "said": "; ".join(str(each.message) for each in heard)}
+            found["outcome"] = OUTCOMES[bool(tries)]
+            return model
+        except PalpateError as error:
+            cure = _cure(str(error))
+            found |= {"given": dict(given), "said": str(error)}
+            if cure is None or tries == _CURES:
+                found["outcome"] = OUTCOMES[3 if cure is None and not tries else 2]
+                return None
+            given |= cure
+    return None
+
+
+def _cure(said: str) -> dict[str, Any] | None:
+    """What a refusal names last, as it is typed in Python."""
+    if "--modulus PA" in said:
+        return {"young_modulus_pa": 20e3}
+    flags = re.findall(r"--(sink|mesh-size|up|unit)[ =]([-+\w.,]+)", said.split("' ", 1)[-1])
+    if not flags:
+        return None
+    flag, value = flags[-1]
+    name, kind = _TAKEN[flag]
+    return {name: kind(value.rstrip(".,"))}
+
+
+def _other(path: Path, given: dict[str, Any], model: Model) -> Model:
+    """The same at half the size of tetrahedra, or as near to half as _MOST of them allow."""
+    ratio = max(0.5, (len(model.mesh.tetrahedra) / _MOST) ** (1 / 3))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        size = model.mesh_size_m * (ratio if ratio < 0.8 else 1.4)
+        return pp.model_of(path, **given | {"mesh_size_m": size})
+
+
+def _volume_ratio(drawn: Drawn, model: Model, given: dict[str, Any]) -> float | None:
+    """The model's volume over the object's, of which a sink leaves less."""
+    meant, volume = drawn.volume_mm3, 1e9 * float(model.mesh.volumes.sum())
+    if meant is None or given.get("sink_m"):
+        if not drawn.sound:
+            return None
+        meant = _over_plane(drawn.mesh, 1e3 * model.support.point, model.support.normal)
+    return volume / meant
+
+
+def _over_plane(mesh: Any, foot: np.ndarray, up: np.ndarray) -> float:
+    """mm^3 of a closed mesh over a plane: cones from a point of it to what is left of the triangles."""
+    import pyvista
+
+    whole = pyvista.PolyData.from_regular_faces(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    left = whole.clip(normal=tuple(up), origin=tuple(foot), invert=False).triangulate()
+    corners = np.asarray(left.points, dtype=float)[left.regular_faces] - foot
+    return abs(float(np.linalg.det(corners).sum()) / 6)
+
+
+def _judge(found: dict[str, Any]) -> None:
+    """Turn the outcome into 'wrong' where a number is off; why stands in "wrong"."""
+    wrong, ratio = found["wrong"], found["volume_ratio"]
+    if ratio is not None and abs(ratio - 1) > _VOLUME:
+        wrong.append(f"volume {ratio:.3f}")
+    if "places" in found:
+        if not found["pressed"]:
+            wrong.append("no place could be pressed")
+        elif not found["least_force_n"] > 0:
+            wrong.append("a force of 0")
+        if found["unsettled"]:
+            wrong.append(f"{found['unsettled']} ticks unsettled")
+        wrong += [f"sizes {x:+.3f}" for x in found["between_sizes"] if abs(x) > _SIZES]
+        wrong += [f"Hertz {x - 1:+.3f}" for x in found["over_hertz"] if abs(x - 1) > _HERTZ]
+        wrong += [f"solver {x:+.3f} of {b:.3f}" for x, b in found["over_solver"] if abs(x) > b]
+    if wrong:
+        found["outcome"] = "wrong"
+
+
+def _line(name: str, one: dict[str, Any]) -> str:
+    """Of a shape: outcome, what was given, volume, places, greatest differences, processor time."""
+    words = [f"{name:34} {one['outcome']:18}"]
+    if one.get("volume_ratio"):
+        words.append(f"volume {one['volume_ratio']:.3f}")
+    if "places" in one:
+        words.append(f"{one['pressed']} of {one['places']} places")
+        for key, shift in (("between_sizes", 0), ("over_hertz", 1)):
+            if one[key]:
+                worst = max((x - shift for x in one[key]), key=abs)
+                words.append(f"{key} {100 * worst:+.1f} %")
+        words += [f"solver {100 * x:+.1f} of {100 * b:.1f} %" for x, b in one["over_solver"]]
+        words += one["said"] if isinstance(one["said"], list) else []
+    words += [str(one["given"]), f"{one['cpu_s']} s", *one["wrong"]]
+    return "  ".join(words) + (f"  {one['said']}" if isinstance(one["said"], str) and one["said"] else "")
+
+
+def _figures(shapes: dict[str, dict[str, Any]]) -> list[Figure]:
+    """Counts of outcomes, and how far forces lie apart over all places."""
+    counts = {kind: sum(one["outcome"] == kind for one in shapes.values()) for kind in OUTCOMES}
+    figures = rates({kind: (count, len(shapes)) for kind, count in counts.items()})
+    right = sum(counts[kind] for kind in OUTCOMES[:2]) / len(shapes)
+    figures.append(Figure(f"right or by its cure, of {len(shapes)} shapes", right).at_least(55 / 60))
+    for kind in OUTCOMES[4:]:
+        figures.append(Figure(f"shapes that end {kind}", counts[kind]).at_most(0))
+
+    def gathered(key: str) -> np.ndarray:
+        return np.array([x for one in shapes.values() for x in one.get(key, [])], dtype=float)
+
+    sizes, hertz, solver = gathered("between_sizes"), gathered("over_hertz") - 1, gathered("over_solver")
+    if len(sizes):
+        within = float((np.abs(sizes) <= _SIZES).mean())
+        what = f"forces of two mesh sizes within 2 % of each other, of {len(sizes)}"
+        figures.append(Figure(what, within).at_least(1.0))
+        figures.append(_spread("force of one mesh size over the other's, less 1", sizes))
+    if len(hertz):
+        figures.append(_spread(f"force over Hertz's, less 1, at {len(hertz)} places", hertz))
+    if len(solver):
+        within = float((np.abs(solver[:, 0]) <= solver[:, 1]).mean())
+        what = f"forces within the stated width of the solved press, of {len(solver)}"
+        figures.append(Figure(what, within).at_least(0.95))
+        figures.append(_spread("force over the solved press's, less 1", solver[:, 0]))
+    return figures
+
+
+def _spread(what: str, values: np.ndarray) -> Figure:
+    low, middle, high = (100 * float(x) for x in np.percentile(values, [2.5, 50, 97.5]))
+    return Figure(f"{what}: median (middle 95 %)", middle, (low, high), "%")

@@ -16,6 +16,9 @@ import numpy as np
 _MOST = 50
 """More labels than these number cells, not materials."""
 
+_SPECK = 1e-4
+"""Of the largest body's volume: a smaller one beside it is dust of a scanner."""
+
 
 @dataclass(frozen=True)
 class Part:
@@ -50,6 +53,31 @@ def shares(parts: Sequence[Part], points: np.ndarray) -> np.ndarray:
         found = cloud.select_interior_points(shell, check_surface=False)
         owner[np.asarray(found["selected_points"], dtype=bool)] = k
     return (owner.reshape(points.shape[:2])[:, :, None] == np.arange(len(parts))).mean(axis=1)
+
+
+def without_specks(shell: Any) -> tuple[Any, tuple[str, ...]]:
+    """A shell of closed bodies without those that are dust beside the largest, as scanners leave it; what was
+    left out. What lies inside of the largest is no dust, however small."""
+    import pyvista
+
+    each = shell.split(only_watertight=True)
+    volume = np.array([abs(float(body.volume)) for body in each])
+    small = np.flatnonzero(volume < _SPECK * volume.max(initial=0.0))
+    if not len(small):
+        return shell, ()
+    largest = each[int(volume.argmax())]
+    around = pyvista.PolyData.from_regular_faces(np.asarray(largest.vertices), np.asarray(largest.faces))
+    cloud = pyvista.PolyData(np.array([each[k].vertices.mean(axis=0) for k in small]))
+    inside = cloud.select_interior_points(around, check_surface=False)["selected_points"].astype(bool)
+    gone = [each[k] for k in small[~inside]]
+    if not gone:
+        return shell, ()
+    nodes = {tuple(vertex) for body in gone for vertex in np.asarray(body.vertices)}
+    kept = shell.copy()
+    corner = np.asarray(kept.vertices)[np.asarray(kept.faces)[:, 0]]
+    kept.update_faces(np.array([tuple(vertex) not in nodes for vertex in corner]))
+    kept.remove_unreferenced_vertices()
+    return kept, (f"{len(gone)} speck{'s' * (len(gone) > 1)} beside it left out",)
 
 
 def bodies(shell: Any, path: Path | None, metres: float) -> tuple[Part, ...]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from palpate.mechanics.disk.gmsh1 import is_gmsh1, read_gmsh1
 from palpate.mechanics.disk.holes import close
-from palpate.mechanics.disk.mesh_parts import Part, bodies, labels
+from palpate.mechanics.disk.mesh_parts import Part, bodies, labels, without_specks
 from palpate.mechanics.disk.overheard import overheard
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
@@ -110,14 +110,14 @@ def _closed(
     labelled: tuple[Part, ...] = (),
     path: Path | None = None,
 ) -> ClosedSurface:
-    shell = _cleaned(shell)
+    shell, joined = _cleaned(shell)
     if not len(shell.faces):
         raise SurfaceError(f"'{name}' holds no triangles: export the object as a surface of triangles")
     size = float(np.ptp(shell.vertices, axis=0).max())
     _check_size(name, size, unit)
     given = name, np.array(shell.vertices) * UNITS[unit], np.array(shell.faces, dtype=np.int64)
     try:
-        notes = close(shell, name, UNITS[unit], up)
+        notes = joined + close(shell, name, UNITS[unit], up)
     except SurfaceError as error:
         raise NotClosedError(str(error), *given) from error
     if shell.volume < 0:
@@ -128,6 +128,9 @@ def _closed(
             "cancel; a solid object is needed: mend it in the program that made the file",
             *given,
         )
+    if not labelled:
+        shell, dust = without_specks(shell)
+        notes += dust
     vertices = np.asarray(shell.vertices) * UNITS[unit]
     parts = labelled or bodies(shell, path, UNITS[unit])
     return ClosedSurface(vertices, np.asarray(shell.faces, dtype=np.int64), name, notes, parts)
@@ -214,13 +217,36 @@ _SOLID = (10, 11, 12, 13, 14, 24, 25, 26, 27, 29, 37)
 """VTK's numbers of tetrahedra, voxels, hexahedra, wedges and pyramids, linear and quadratic."""
 
 
-def _cleaned(shell: trimesh.Trimesh) -> trimesh.Trimesh:
-    """One node a place, no triangle twice or flat, all wound alike."""
+def _cleaned(shell: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
+    """One node a place, no triangle twice or flat, no wall between bodies that touch; what was joined."""
     shell.merge_vertices(merge_tex=True, merge_norm=True)
-    shell.update_faces(shell.unique_faces())
     shell.update_faces(shell.nondegenerate_faces(height=1e-12 * max(float(shell.scale), 1e-12)))
+    open_walls = _without_walls(shell)
+    words: tuple[str, ...] = ()
+    if open_walls is None:
+        shell.update_faces(shell.unique_faces())
+    else:
+        shell, words = open_walls, ("bodies that touch joined",)
     shell.remove_unreferenced_vertices()
-    return shell
+    return shell, words
+
+
+def _without_walls(shell: trimesh.Trimesh) -> trimesh.Trimesh | None:
+    """The shell without pairs of triangles on the same nodes that look opposite ways, as bodies have that
+    share a face; None where there are none, or where that leaves it open, as of a surface drawn on both
+    sides."""
+    faces = np.asarray(shell.faces)
+    order = np.argsort(faces, axis=1)
+    side = np.linalg.det(np.eye(3)[order]).round()
+    _, same = np.unique(np.take_along_axis(faces, order, 1), axis=0, return_inverse=True)
+    left, count = np.bincount(same.ravel(), side), np.bincount(same.ravel())
+    if not ((count > 1) & (left == 0)).any():
+        return None
+    kept = shell.copy()
+    kept.update_faces(left[same.ravel()] != 0)
+    kept.update_faces(kept.unique_faces())
+    kept.remove_unreferenced_vertices()
+    return kept if len(kept.faces) and kept.is_watertight else None
 
 
 def _check_size(name: str, size: float, unit: str) -> None:

@@ -84,9 +84,11 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
             PointFoot,
             stacklevel=2,
         )
-    low = float((vertices[nodes] @ normal).min())
+    height = vertices @ normal
+    low = float(height[nodes].min())
+    nodes = np.union1d(nodes, np.flatnonzero(height < low))  # of a rough foot some corners hang lower
     vertices = vertices.copy()
-    vertices[nodes] += np.outer(low - vertices[nodes] @ normal, normal)
+    vertices[nodes] += np.outer(low - height[nodes], normal)
     area = triangle_areas(vertices, triangles[foot])
     middle = np.average(vertices[triangles[foot]].mean(axis=1), axis=0, weights=area)
     return Standing(vertices, triangles, middle, normal)
@@ -229,6 +231,8 @@ def _tilted(
     # of the many triangles of a scanned foot the mean is its plane
     own = -(area[foot, None] * facing[foot]).sum(axis=0)
     own /= np.linalg.norm(own)
+    if own @ normal > np.sqrt(1 - _LOW**2):  # within what a foot is levelled by anyway
+        return None
     return float(np.degrees(np.arccos(np.clip(own @ normal, -1, 1)))), share, own
 
 

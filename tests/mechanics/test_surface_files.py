@@ -308,6 +308,19 @@ def test_a_body_in_the_air_is_refused_and_one_that_touches_what_stands_is_not():
     assert len(standing(stack(0.03)).triangles) == 24
 
 
+def test_nothing_of_a_rough_foot_hangs_below_the_support():
+    """One corner of the rim lies 0.3 mm lower, and the triangles at it are too steep to be the foot's."""
+    cylinder = trimesh.creation.cylinder(radius=0.03, height=0.04, sections=128).subdivide().subdivide()
+    low, far = cylinder.vertices[:, 2].min(), np.linalg.norm(cylinder.vertices[:, :2], axis=1)
+    rim = np.flatnonzero((cylinder.vertices[:, 2] == low) & (far > 0.0299))
+    cylinder.vertices[rim[0]] -= [0, 0, 3e-4]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", TiltedFoot)
+        stood = standing(surface_of(cylinder))
+    reach = (stood.vertices - stood.support_point) @ stood.support_normal
+    assert reach.min() == pytest.approx(0, abs=1e-12)
+
+
 def test_a_foot_that_is_tilted_in_the_file_is_stood_on_and_said():
     block = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
     turn = trimesh.transformations.rotation_matrix(np.radians(7.5), [1, 0.4, 0])
@@ -373,6 +386,38 @@ def test_bodies_inside_or_beside_one_another_are_listed_with_their_volumes(tmp_p
     found = read_surface(named(tmp_path, ("liver", SIZE_MM, (0, 0, 0)), ("tumour", (10, 10, 10), at)), "mm")
     assert {p.name: round(1e6 * p.volume_m3, 6) for p in found.parts} == {"liver": 120.0, "tumour": 1.0}
     assert read_surface(written(tmp_path, "one.obj"), "mm").parts == ()
+
+
+def test_bodies_that_share_a_face_are_joined_and_a_surface_of_two_sides_is_one(tmp_path):
+    layers = [trimesh.creation.box(extents=(0.05, 0.05, 0.015)) for _ in range(3)]
+    layers[1].apply_scale([1, 1, -1])  # the same diagonals on both sides of a wall, as a mesher leaves it
+    for k, layer in enumerate(layers):
+        layer.apply_translation([0, 0, 0.015 * k])
+    trimesh.util.concatenate(layers).export(tmp_path / "layers.stl")
+    found = read_surface(tmp_path / "layers.stl")
+    assert volume(found) == pytest.approx(0.05 * 0.05 * 0.045, rel=1e-5)
+    assert "bodies that touch joined" in found.notes and not found.parts
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.03)
+    both = np.vstack([ball.faces, ball.faces[:, ::-1]])
+    trimesh.Trimesh(ball.vertices, both, process=False).export(tmp_path / "twice.stl")
+    found = read_surface(tmp_path / "twice.stl")
+    assert volume(found) == pytest.approx(ball.volume, rel=1e-5)
+
+
+def test_specks_beside_a_body_are_left_out_and_said_and_a_small_part_inside_stays(tmp_path):
+    def read(*shells):
+        trimesh.util.concatenate(shells).export(tmp_path / "dusty.ply")
+        return read_surface(tmp_path / "dusty.ply")
+
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+    dust = [trimesh.creation.icosphere(subdivisions=0, radius=6e-4) for _ in range(3)]
+    for speck, at in zip(dust, ([0.04, 0, 0], [0.024, 0.024, 0.024], [0.05, 0.01, -0.04]), strict=True):
+        speck.apply_translation(at)
+    found = read(ball, *dust)
+    assert volume(found) == pytest.approx(ball.volume, rel=1e-5)
+    assert not found.parts and "3 specks" in found.notes[-1]
+    inside = trimesh.creation.icosphere(subdivisions=1, radius=6e-4)
+    assert len(read(ball, inside).parts) == 2
 
 
 def test_labels_of_cells_are_listed_with_their_volumes(tmp_path):

@@ -8,21 +8,59 @@ import trimesh
 
 from palpate.mechanics.errors import NotClosedError
 from palpate.mechanics.shape.flat_foot import standing
+from palpate.mechanics.shape.tetmesh import box_mesh
+from palpate.reconstruction.geometry import filled
 from palpate.reconstruction.geometry.filled import solid_of
 
 
 @pytest.mark.slow
 def test_a_soup_is_filled_and_stands():
-    """Every triangle by itself, its corners off by micrometres."""
-    block = trimesh.creation.box(extents=(0.06, 0.05, 0.04)).subdivide()
+    """Every triangle by itself, its corners off by more than rounding."""
+    block = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
     corners = np.array(block.triangles).reshape(-1, 3)
-    corners += np.random.default_rng(2).normal(0, 2e-6, corners.shape)
+    corners += np.random.default_rng(2).normal(0, 2e-5, corners.shape)
     soup = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
     found = solid_of(soup)
     solid = trimesh.Trimesh(found.vertices, found.triangles, process=False)
     assert solid.volume == pytest.approx(block.volume, rel=0.01)
     assert "filled" in found.notes[0]
     assert standing(found).support_point[2] == pytest.approx(-0.02, abs=2e-4)
+
+
+def test_corners_apart_by_rounding_are_joined_without_the_mesher(monkeypatch):
+    def never(*_, **__):
+        raise AssertionError("the mesher was asked")
+
+    monkeypatch.setattr(filled, "tetrahedralize", never)
+    block = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+    corners = np.array(block.triangles).reshape(-1, 3)
+    corners += np.random.default_rng(2).normal(0, 2e-6, corners.shape)
+    soup = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+    found = solid_of(soup)
+    assert len(found.triangles) == len(block.faces) and "joined" in found.notes[0]
+    solid = trimesh.Trimesh(found.vertices, found.triangles, process=False)
+    assert solid.volume == pytest.approx(block.volume, rel=1e-3)
+
+
+def test_tetrahedra_that_meet_in_an_edge_alone_have_a_closed_boundary_each():
+    left = box_mesh((2, 2, 2), (0.03, 0.03, 0.03))
+    points = np.vstack([left.points, left.points + [0.03, 0.03, 0]])
+    places, merged = np.unique(np.round(points, 9), axis=0, return_inverse=True)
+    cells = merged.ravel()[np.vstack([left.tetrahedra, left.tetrahedra + len(left.points)])]
+    shell = trimesh.Trimesh(*filled._boundary(places, cells), process=False)
+    assert shell.is_watertight and shell.is_winding_consistent
+    assert shell.volume == pytest.approx(2 * 0.03**3)
+
+
+@pytest.mark.slow
+def test_a_wall_between_bodies_that_touch_is_no_reason_to_refuse():
+    left, right = (trimesh.creation.box(extents=(0.03, 0.04, h)) for h in (0.03, 0.045))
+    right.apply_translation([0.03, 0, 0.0075])
+    both = trimesh.util.concatenate([left, right])
+    both.merge_vertices()
+    found = solid_of(both)
+    solid = trimesh.Trimesh(found.vertices, found.triangles, process=False)
+    assert solid.volume == pytest.approx(left.volume + right.volume, rel=0.01)
 
 
 def test_a_sheet_stays_refused():

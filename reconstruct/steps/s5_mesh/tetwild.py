@@ -69,12 +69,14 @@ def tetrahedralize(
     envelope_m: float,
     simplify: bool = True,
     threads: int | None = None,
+    passes: int = _PASSES,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, of the solid inside a closed surface.
 
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
     simplify: merge triangles within the envelope first; a drawing as coarse as the tetrahedra needs none,
-    and comes out better in half the time. threads: None takes OMP_NUM_THREADS, without it all cores. Raises
+    and comes out better in half the time. threads: None takes OMP_NUM_THREADS, without it all cores. passes:
+    of optimisation at most; few where their surface alone is wanted. Raises
     MeshError where nothing comes back, MeshTooDear where that is for the size.
     """
     check_count(vertices, triangles, edge_m)
@@ -94,7 +96,7 @@ def tetrahedralize(
                 epsilon=envelope_m / diagonal,
                 simplify=merges,
                 stop_energy=_ENERGY,
-                num_opt_iter=_PASSES,
+                num_opt_iter=passes,
                 num_threads=count,
             )
             ended = _ended(folder, limit_s)

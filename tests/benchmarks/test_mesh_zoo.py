@@ -1,0 +1,46 @@
+"""Ten of the zoo's meshes become a model that presses, by themselves or by the cure that a refusal names."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, tried
+
+TEN = (
+    "prostate",
+    "block of 10 mm",
+    "cylinder",
+    "plate of 6 mm",
+    "two blocks touching",
+    "dome, scanned on a table",
+    "dome, inside out",
+    "dome, triangles of no area",
+    "dome in inches",
+    "dome with specks",
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TEN)
+def test_a_mesh_of_the_zoo_is_pressed_right(name, tmp_path):
+    found = tried(ZOO[name](), tmp_path, sizes=1, places=1, solved=0)
+    assert found["outcome"] in OUTCOMES[:2], found
+    assert found["pressed"] == 1 and found["least_force_n"] > 0
+
+
+def test_there_are_sixty():
+    assert len(ZOO) == 60
+
+
+@pytest.mark.parametrize(
+    "said, given",
+    [
+        ("'a.stl' has no flat foot with +z up: cut off what settles, --sink 0.0018", {"sink_m": 0.0018}),
+        ("'a' is 60 m across: these look like mm: give --unit mm", {"unit": "mm"}),
+        ("'a': its flat foot is for --up=0.1,-0.2,1; or turn it", {"up": "0.1,-0.2,1"}),
+        ("say --modulus 'body 1=PA', or --modulus PA, one for all", {"young_modulus_pa": 20e3}),
+        ("it encloses no volume", None),
+    ],
+)
+def test_the_cure_is_read_from_a_refusal(said, given):
+    assert _cure(said) == given
