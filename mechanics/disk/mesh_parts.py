@@ -60,7 +60,7 @@ def without_specks(shell: Any) -> tuple[Any, tuple[str, ...]]:
     left out. What lies inside of the largest is no dust, however small."""
     import pyvista
 
-    each = shell.split(only_watertight=True)
+    each = shell.split(only_watertight=True, repair=False)
     volume = np.array([abs(float(body.volume)) for body in each])
     small = np.flatnonzero(volume < _SPECK * volume.max(initial=0.0))
     if not len(small):
@@ -83,7 +83,7 @@ def without_specks(shell: Any) -> tuple[Any, tuple[str, ...]]:
 def bodies(shell: Any, path: Path | None, metres: float) -> tuple[Part, ...]:
     """The closed bodies of a shell of triangles in a unit of so many metres; empty where it is one. Named as
     the objects or groups of an OBJ file are that lie there."""
-    each = shell.split(only_watertight=True)
+    each = shell.split(only_watertight=True, repair=False)
     if len(each) < 2:
         return ()
     named = _groups(path) if path is not None and path.suffix.lower() == ".obj" else {}
