@@ -317,18 +317,3 @@ def read_curve(path: Path | str) -> Curve:
     except (TypeError, ValueError) as error:
         raise RecordingError(f"'{path}' has a value that is no number: {error}") from error
     return Curve(table[:, 0], table[:, 1:4], table[:, 4], table[:, 5:8])
-
-
-def greatest_difference(curve: Curve, expected: Curve) -> tuple[float, float]:
-    """(N, s): the longest difference of the force vectors, and when; the expected curve is read at curve.t.
-
-    Where one lasts longer than the other, the rest counts in full against zero force.
-    """
-    t = np.union1d(curve.t, expected.t)
-
-    def at(c: Curve) -> np.ndarray:
-        return np.column_stack([np.interp(t, c.t, f, left=0.0, right=0.0) for f in c.force.T])
-
-    difference = np.linalg.norm(at(curve) - at(expected), axis=1)
-    worst = int(np.argmax(difference))
-    return float(difference[worst]), float(t[worst])

@@ -33,7 +33,9 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
     if result.renderer is None:
         yield say.Headline(f"a curve that was read: {result.peak_force_n:.4g} N at most, {mm(depth)} deep")
         return
-    force = ", ".join(f"{round(float(f), 3) + 0.0:g}" for f in result.force_at(depth))
+    there = result.force_at(depth)
+    digits = max(3, 2 - int(np.floor(np.log10(np.abs(there).max()))) if there.any() else 3)
+    force = ", ".join(f"{round(float(f), digits) + 0.0:g}" for f in there)
     normal = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in np.asarray(result.normal))
     made = result.renderer.model
     if result.on_support:
