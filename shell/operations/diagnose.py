@@ -166,8 +166,8 @@ def diagnose(
     _check(simulated, renderer, mended, presses, stated, runs)
     if baseline is not None and renderer is None and simulated is None:
         raise OptionError("--baseline is of another simulator: name it by --simulated or --renderer")
-    forces = None if simulated is None else _forces(simulated)
-    best = None if baseline is None or simulated is None else _forces(baseline)
+    forces = None if simulated is None else _forces(simulated, of_forces.simulated_unit)
+    best = None if baseline is None or simulated is None else _forces(baseline, of_forces.simulated_unit)
     if corrected and not str(corrected).endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{corrected}' must end in .csv or .csv.gz")
     source, measured = given_model(model, file), read_recording(recording)
@@ -340,9 +340,10 @@ def _check(
         stated_values(stated)
 
 
-def _forces(simulated: Any) -> Any:
+def _forces(simulated: Any, unit: str | None) -> Any:
     """The simulated forces, looked at before the work."""
-    from palpate.diagnosis.other_simulator.forces import read_forces, sorted_forces
+    from palpate.diagnosis.other_simulator.forces import sorted_forces
+    from palpate.importing.simulated_forces import read_forces
 
     if isinstance(simulated, tuple | list):
         import numpy as np
@@ -351,4 +352,4 @@ def _forces(simulated: Any) -> Any:
         if t.ndim != 1 or force.shape != (len(t), 3):
             raise OptionError(f"simulated needs t (n,) and force (n, 3); got {t.shape} and {force.shape}")
         return sorted_forces(t, force, "simulated")
-    return read_forces(simulated)
+    return read_forces(simulated, unit)
