@@ -15,6 +15,7 @@ import numpy as np
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
 from palpate.diagnosis.other_simulator.frame import UNITS, Frame, weighed_frame
 from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.law_errors import Smallest
 from palpate.mechanics.options import option
 from palpate.mechanics.plausible import COLUMN
 from palpate.mechanics.presses.table import LEAD_S, Presses
@@ -42,6 +43,10 @@ LONGEST_GAP_S = 0.03
 AGAINST, LAG_S, BETTER = -0.3, 0.15, 0.1
 """Cosine from which forces point the wrong way; lag that no delay makes; by how much it must fit better."""
 _GRID_S = 0.02
+COARSE = 0.5
+"""Of the smallest change that is named as a flaw: reading errors are alike at every press, and above it a
+wrong flaw is named. A spring of 0.88 N/mm was found as such where they were a tenth (50 Hz), and as mesh stiffness
+where they were 0.6 of it (25 Hz)."""
 _MOST_TIMES = 20
 """Of the recording's length, that a file may last and another clock is still looked for."""
 
@@ -86,12 +91,13 @@ class Forces:
 @dataclass(frozen=True)
 class Aligned:
     """force: (n, 3) N on the tool at the rows of the presses. usable: (p,) bool. notes: in words. frame: how
-    the file writes them."""
+    the file writes them. coarse: that its rows are too far apart, in words, '' where they are not."""
 
     force: np.ndarray
     usable: np.ndarray
     notes: tuple[str, ...]
     frame: Frame = field(default_factory=Frame)
+    coarse: str = ""
 
 
 def sorted_forces(t: np.ndarray, force: np.ndarray, name: str) -> Forces:
@@ -143,6 +149,7 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions, level: floa
         notes.append(
             f"rows come at {1 / step:.4g} Hz, the recording's at {1 / own:.4g} Hz: straight lines between"
         )
+    coarse = _too_coarse(step, presses)
     run = np.ones(len(presses), dtype=bool) if given.chosen is None else given.chosen
     usable = run & _without_gaps(t, presses, step)
     there = run & (presses.onset_s >= t[0]) & (presses.end_s <= t[-1])
@@ -151,7 +158,41 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions, level: floa
             f"{(there & ~usable).sum()} of {run.sum()} presses were left out: rows are missing for over "
             f"{1e3 * LONGEST_GAP_S:g} ms"
         )
-    return Aligned(at, usable, tuple(notes), frame)
+    return Aligned(at, usable, tuple(notes), frame, coarse)
+
+
+def reading_error_n(step: float, presses: Presses) -> float:
+    """N rms over contact samples by which the measured force changes where it is read every `step` seconds
+    and joined by straight lines, less what its own noise makes of that."""
+    own = 1.0 / presses.sample_rate_hz
+    if step <= own:
+        return 0.0
+    net = presses.force - presses.free_air
+    off = np.zeros_like(net)
+    for part in presses.parts:
+        t = presses.t[part]
+        rows = np.arange(t[0], t[-1] + step, step)
+        for k, force in enumerate(net[part].T):
+            off[part, k] = np.interp(t, rows, np.interp(rows, t, force)) - force
+    # white noise: its own, and two thirds of that between two rows
+    noise = 5 / 3 * presses.vector_noise_n**2 * (1 - own / step)
+    return float(np.sqrt(max((off[presses.counted] ** 2).sum(axis=1).mean() - noise, 0.0)))
+
+
+def _too_coarse(step: float, presses: Presses) -> str:
+    """That rows so far apart change the force by as much as flaws differ by, in words; '' where not."""
+    net = (presses.force - presses.free_air)[presses.counted]
+    least = COARSE * Smallest.simulator.value * float(np.sqrt((net**2).sum(axis=1).mean()))
+    error = reading_error_n(step, presses)
+    if error <= least:
+        return ""
+    enough = step / 2
+    while reading_error_n(enough, presses) > least:
+        enough /= 2
+    return (
+        f"rows at {1 / step:.3g} Hz are too coarse for these presses (the measured force, read so, is off by "
+        f"{1e3 * error:.0f} mN): log at {1 / enough:.3g} Hz or more"
+    )
 
 
 def _in_seconds(t: np.ndarray, presses: Presses) -> None:

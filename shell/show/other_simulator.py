@@ -143,6 +143,9 @@ _MOST = {
 
 def verdict(result: SimulatedGap) -> str:
     """The answer in one sentence."""
+    if result.coarse:
+        told = spoken(result.effects) or "nothing"
+        return f"not settled: {result.coarse}; until then do not mend what is named: {told}"
     first = max(PARTS, key=lambda name: result.parts[name].share)
     if settled := _settled(result):
         most = f"most of the gap is numerics: {settled}"
@@ -294,6 +297,8 @@ def _given(result: SimulatedGap) -> list[tuple[str, str, str, str]]:
 
 def lead(result: SimulatedGap) -> str:
     """The page's first words: how far off, and by what most; or that most of it is not explained."""
+    if result.coarse:
+        return f"Not settled: {result.coarse}."
     off, left = f"It is off by {force_words(result.gap_before_n)}", _open(result)
     most = max(part.share for part in result.parts.values())
     said = _named(result, result.effects[:2])

@@ -19,6 +19,7 @@ from palpate.diagnosis.other_simulator.forces import (
     Forces,
     ForcesOptions,
     aligned,
+    reading_error_n,
     sorted_forces,
     spread_out,
 )
@@ -40,7 +41,7 @@ from palpate.mechanics.quantities import parse_unit
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.registry import create
 from palpate.render.replay import replay
-from palpate.show.other_simulator import keys_in_words, lead
+from palpate.show.other_simulator import keys_in_words, lead, verdict
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -503,6 +504,26 @@ def test_a_file_that_ends_early_is_judged_by_the_presses_that_it_covers(world):
         aligned(Forces(t + late, force, "x"), presses, plain)
     offset = float(re.search(r"--clock-offset (-?[\d.]+)", str(refused.value))[1])
     assert offset == pytest.approx(-late, abs=0.05)
+
+
+def test_rows_too_far_apart_for_the_presses_settle_nothing(world):
+    """Straight lines between them would be named as flaws of the simulator."""
+    recording, model, reality, force, _ = world
+    t, presses = recording.t, model.presses
+
+    def read(step):
+        return Forces(t[::step], force[::step], "x")
+
+    fine, slow = (aligned(read(step), presses, OWN_CLOCK) for step in (2, 50))
+    assert not fine.coarse and slow.coarse
+    truth = np.column_stack([np.interp(presses.t, t, f) for f in force.T])
+    off = np.sqrt(((slow.force - truth)[presses.counted] ** 2).sum(axis=1).mean())
+    assert reading_error_n(0.1, presses) == pytest.approx(off, rel=0.25)
+    asked = Asked(read(50), stated_of({}, model), OWN_CLOCK)
+    result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    assert "unknown" in result.kind and verdict(result).startswith("not settled")
+    enough = float(re.search(r"log at ([\d.]+) Hz", result.coarse)[1])
+    assert not aligned(read(int(250 / enough)), presses, OWN_CLOCK).coarse
 
 
 def test_times_in_milliseconds_are_asked_about(world):
