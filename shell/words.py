@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
+
+
+def typed_word(text: object) -> str:
+    """A path as a shell takes it: quoted where a space or a sign needs it."""
+    word = str(text)
+    if os.name == "posix":
+        return shlex.quote(word)
+    return f'"{word}"' if " " in word else word
 
 
 def spaced(name: str) -> str:

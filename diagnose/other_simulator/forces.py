@@ -45,8 +45,8 @@ AGAINST, LAG_S, BETTER = -0.3, 0.15, 0.1
 _GRID_S = 0.02
 COARSE = 0.5
 """Of the smallest change that is named as a flaw: reading errors are alike at every press, and above it a
-wrong flaw is named. A spring of 0.88 N/mm was found as such where they were a tenth (50 Hz), and as mesh stiffness
-where they were 0.6 of it (25 Hz)."""
+wrong flaw is named. A spring of 0.88 N/mm was found as such where they were a tenth (50 Hz), and as mesh
+stiffness where they were 0.6 of it (25 Hz)."""
 _MOST_TIMES = 20
 """Of the recording's length, that a file may last and another clock is still looked for."""
 

@@ -46,7 +46,7 @@ from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
 from palpate.render.options import DOCUMENTED
 from palpate.render.registry import check_settings
-from palpate.words import unsettled_words
+from palpate.words import typed_word, unsettled_words
 
 if TYPE_CHECKING:
     from palpate.diagnosis.other_simulator.pipeline import Asked
@@ -232,10 +232,12 @@ def diagnose(
     following = []
     if apply:
         call.then(partial(_applied, own, apply))
-        following.append(f"next: feel it: palpate touch {apply}")
+        following.append(f"next: feel it: palpate touch {typed_word(apply)}")
     if corrected:
         call.then(partial(_corrected, own, corrected))
-        following.append(f"next: reconstruct what is left: palpate reconstruct {corrected} -o MODEL")
+        following.append(
+            f"next: reconstruct what is left: palpate reconstruct {typed_word(corrected)} -o MODEL"
+        )
     call.following = following or call.following
     call.then_report(result, report)
     return result

@@ -18,7 +18,7 @@ from palpate.show.model import facing, thing_of, usual_colourings
 from palpate.show.page import feel_step
 from palpate.show.quantities import DEPTH
 from palpate.show.view3d import Colouring, Line, Traces, View
-from palpate.words import kpa, mm, part_words, unsettled_words
+from palpate.words import kpa, mm, part_words, typed_word, unsettled_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +62,7 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
         yield from _solved(result.exact)
     later = "see whether it stays so: press with `-o CURVE.csv`, later with `--expect CURVE.csv`"
     if written is not None:
-        later = f"see later whether it stays so: the same press with `--expect {written}`"
+        later = f"see later whether it stays so: the same press with `--expect {typed_word(written)}`"
     feel = f"feel it: `{touched}`" if touched else None
     yield say.Next([feel or feel_step(made.path, "palpate model FILE -o MODEL"), later])
 

@@ -117,6 +117,8 @@ def story(result: Model) -> say.Story:
         f"{mm(height)} high; tip radius {mm(result.tool.tip_radius_m, '.4g')}; {presses_words(result)}; "
         f"effects: {', '.join(result.effects) or 'none'}"
     )
+    low, high = (", ".join(f"{v:.3g}" for v in f(mesh.points, axis=0)) for f in (np.min, np.max))
+    yield say.Detail(f"it lies within ({low}) to ({high}) m: `palpate press --at X,Y,Z` there")
     yield say.Detail(
         f"mesh: {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra of order {mesh.order}, "
         f"edges of {mm(result.mesh_size_m, '.4g')}"

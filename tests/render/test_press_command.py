@@ -55,6 +55,20 @@ def test_a_softer_object_and_another_press_do_not_pass_unasked(model_folder, tmp
         assert json.loads(result.read_text())["same_path"] is False
 
 
+def test_a_suggested_command_takes_a_path_with_a_space(model_folder, tmp_path, capsys):
+    import shlex
+
+    stored = str(tmp_path / "my curve.csv")
+    assert main(["press", model_folder, *DOWN, "-o", stored]) == 0
+    line = next(each for each in capsys.readouterr().out.splitlines() if "--expect" in each)
+    assert stored in shlex.split(line)
+
+
+def test_a_point_in_millimetres_is_asked_back(model_folder, capsys):
+    assert main(["press", model_folder, "--at", "10,5,30", "--direction", "1,0,0"]) == 2
+    assert "--at 0.01,0.005,0.03" in capsys.readouterr().err
+
+
 def test_a_modulus_in_kilopascals_is_asked_back_and_no_small_number_is_lost(model_folder, capsys):
     assert main(["press", model_folder, *DOWN, "--modulus", "5"]) == 0
     told = capsys.readouterr()
