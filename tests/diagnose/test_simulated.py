@@ -506,6 +506,16 @@ def test_a_file_that_ends_early_is_judged_by_the_presses_that_it_covers(world):
     assert offset == pytest.approx(-late, abs=0.05)
 
 
+def test_the_answer_says_how_bad_against_the_force_and_where(world):
+    """A third more force is a third of it; what is not named has no size."""
+    told = str(judged(world, 1.5 * world[3]))
+    gap = next(line for line in told.splitlines() if line.startswith("gap: "))
+    assert float(re.search(r"([\d.]+)\s%", gap)[1]) == pytest.approx(50, abs=5)
+    assert any(line.startswith("where: ") for line in told.splitlines())
+    parts = [line for line in told.splitlines() if line.strip().startswith("parameters, ")]
+    assert parts[0].endswith(": -")
+
+
 def test_rows_too_far_apart_for_the_presses_settle_nothing(world):
     """Straight lines between them would be named as flaws of the simulator."""
     recording, model, reality, force, _ = world
