@@ -243,13 +243,26 @@ def first_touch(
     on_object = _on_object(surface, at, direction, radius)
     if on_object is None and beside is None:
         low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+        meant = _in_millimetres(at, low, high)
         raise OptionError(
             f"a tip of radius {radius} m aimed at {at.tolist()} along {np.round(direction, 4).tolist()} does "
             f"not meet the touchable surface (object within {np.round(low, 4).tolist()} to "
-            f"{np.round(high, 4).tolist()} m), nor a support next to it"
+            f"{np.round(high, 4).tolist()} m), nor a support next to it{meant}"
         )
     found = [(*each, each is beside) for each in (on_object, beside) if each is not None]
     return min(found, key=lambda f: f[0] @ direction)
+
+
+def _in_millimetres(at: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:
+    """That a point missed the object, which lies within low to high (3,) m, because it is in mm; '' where a
+    thousandth of it is not near the object either."""
+    near, size = at / 1e3, float(np.linalg.norm(high - low))
+    if (
+        np.abs(at).max() < 10 * np.abs([low, high]).max()
+        or not ((near > low - size) & (near < high + size)).all()
+    ):
+        return ""
+    return f": these look like mm; in metres it is --at {','.join(f'{v:g}' for v in near)}"
 
 
 def _on_support(
@@ -317,18 +330,3 @@ def read_curve(path: Path | str) -> Curve:
     except (TypeError, ValueError) as error:
         raise RecordingError(f"'{path}' has a value that is no number: {error}") from error
     return Curve(table[:, 0], table[:, 1:4], table[:, 4], table[:, 5:8])
-
-
-def greatest_difference(curve: Curve, expected: Curve) -> tuple[float, float]:
-    """(N, s): the longest difference of the force vectors, and when; the expected curve is read at curve.t.
-
-    Where one lasts longer than the other, the rest counts in full against zero force.
-    """
-    t = np.union1d(curve.t, expected.t)
-
-    def at(c: Curve) -> np.ndarray:
-        return np.column_stack([np.interp(t, c.t, f, left=0.0, right=0.0) for f in c.force.T])
-
-    difference = np.linalg.norm(at(curve) - at(expected), axis=1)
-    worst = int(np.argmax(difference))
-    return float(difference[worst]), float(t[worst])

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
+
+
+def typed_word(text: object) -> str:
+    """A path as a shell takes it: quoted where a space or a sign needs it."""
+    word = str(text)
+    if os.name == "posix":
+        return shlex.quote(word)
+    return f'"{word}"' if " " in word else word
 
 
 def spaced(name: str) -> str:
@@ -119,8 +129,14 @@ def mn(newtons: float, form: str = ".0f") -> str:
     return f"{1e3 * newtons:{form}} mN"
 
 
+_FEW_PA = 100.0
+"""Below, a modulus is written in pascals: kilopascals would round it away."""
+
+
 def kpa(pascals: float, form: str = ".2f") -> str:
-    """A modulus in kilopascals."""
+    """A modulus in kilopascals, in pascals below 100. form: of kilopascals."""
+    if 0 < abs(pascals) < _FEW_PA:
+        return f"{pascals:{'+' * form.startswith('+')}.3g} Pa"
     return f"{pascals / 1e3:{form}} kPa"
 
 
@@ -130,9 +146,9 @@ def sure(low: object, high: object) -> str:
 
 
 def sure_kpa(ci95_pa: Sequence[float], form: str = ".2f") -> str:
-    """The 95 % interval of a modulus, Pa."""
+    """The 95 % interval of a modulus, Pa; both ends in the unit that is said."""
     low, high = ci95_pa
-    return sure(f"{low / 1e3:{form}}", kpa(high, form))
+    return sure(f"{low:.3g}" if 0 < high < _FEW_PA else f"{low / 1e3:{form}}", kpa(high, form))
 
 
 def place_mm(point_m: Iterable[float]) -> str:

@@ -1,6 +1,6 @@
-"""Which presses a slow simulator is run over.
+"""Another simulator's forces along the recorded path, set beside the recording's presses.
 
-Another simulator's forces along the recorded path, read and set beside the recording's presses.
+And which presses a slow simulator is run over.
 
 Nothing about them is guessed in silence: what is unclear is refused with the option that settles it, what was
 interpolated or left out is said (`Aligned.notes`).
@@ -9,16 +9,17 @@ interpolated or left out is said (`Aligned.notes`).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
 from palpate.diagnosis.other_simulator.frame import UNITS, Frame, weighed_frame
-from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.errors import OptionError, RecordingError
+from palpate.mechanics.law_errors import Smallest
 from palpate.mechanics.options import option
+from palpate.mechanics.plausible import COLUMN
 from palpate.mechanics.presses.table import LEAD_S, Presses
+from palpate.mechanics.quantities import parse_unit
 
 
 def spread_out(presses: Presses, most: int | None) -> np.ndarray:
@@ -37,13 +38,17 @@ def spread_out(presses: Presses, most: int | None) -> np.ndarray:
     return chosen
 
 
-COLUMNS = ("t", "fx", "fy", "fz")
 LONGEST_GAP_S = 0.03
 """Without rows in a press, over which nothing is interpolated: the press is left out."""
 AGAINST, LAG_S, BETTER = -0.3, 0.15, 0.1
 """Cosine from which forces point the wrong way; lag that no delay makes; by how much it must fit better."""
 _GRID_S = 0.02
-_MOST_LAG_S = 60.0
+COARSE = 0.5
+"""Of the smallest change that is named as a flaw: reading errors are alike at every press, and above it a
+wrong flaw is named. A spring of 0.88 N/mm was found as such where they were a tenth (50 Hz), and as mesh
+stiffness where they were 0.6 of it (25 Hz)."""
+_MOST_TIMES = 20
+"""Of the recording's length, that a file may last and another clock is still looked for."""
 
 
 @dataclass(frozen=True)
@@ -86,28 +91,13 @@ class Forces:
 @dataclass(frozen=True)
 class Aligned:
     """force: (n, 3) N on the tool at the rows of the presses. usable: (p,) bool. notes: in words. frame: how
-    the file writes them."""
+    the file writes them. coarse: that its rows are too far apart, in words, '' where they are not."""
 
     force: np.ndarray
     usable: np.ndarray
     notes: tuple[str, ...]
     frame: Frame = field(default_factory=Frame)
-
-
-def read_forces(path: Path | str) -> Forces:
-    """`t,fx,fy,fz` (s, N); further columns are left alone. Raises RecordingError for what is no such file."""
-    path = Path(path)
-    with reading(path, RecordingError), open(path, encoding="utf-8-sig", errors="replace") as file:
-        header = [name.strip().lower() for name in file.readline().split(",")]
-        missing = [name for name in COLUMNS if name not in header]
-        if missing:
-            raise RecordingError(
-                f"'{path}' lacks the columns {', '.join(missing)}: needed are t,fx,fy,fz (s, N on the tool)"
-            )
-        table = np.genfromtxt(file, delimiter=",", usecols=[header.index(c) for c in COLUMNS], ndmin=2)
-    if not len(table):
-        raise RecordingError(f"'{path}' has no rows: needed is one a sample of the recorded path")
-    return sorted_forces(table[:, 0], table[:, 1:], path.name)
+    coarse: str = ""
 
 
 def sorted_forces(t: np.ndarray, force: np.ndarray, name: str) -> Forces:
@@ -138,9 +128,10 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions, level: floa
     notes = list(given.notes)
     t = given.t + (options.clock_offset_s or 0.0)
     force = given.force if options.simulated_force_on == "tool" else -given.force
-    _same_time(t, presses)
+    _in_seconds(t, presses)
     if options.clock_offset_s is None:
         _same_clock(t, force, presses)
+    notes += _same_time(t, presses)
     at = np.column_stack([np.interp(presses.t, t, f, left=0.0, right=0.0) for f in force.T])
     rows = presses.counted if given.chosen is None else presses.counted & given.chosen[presses.press]
     if not (at[rows] ** 2).any():
@@ -158,52 +149,110 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions, level: floa
         notes.append(
             f"rows come at {1 / step:.4g} Hz, the recording's at {1 / own:.4g} Hz: straight lines between"
         )
+    coarse = _too_coarse(step, presses)
     run = np.ones(len(presses), dtype=bool) if given.chosen is None else given.chosen
     usable = run & _without_gaps(t, presses, step)
-    if not usable[run].all():
+    there = run & (presses.onset_s >= t[0]) & (presses.end_s <= t[-1])
+    if not usable[there].all():
         notes.append(
-            f"{(run & ~usable).sum()} of {run.sum()} presses were left out: rows are missing for over "
+            f"{(there & ~usable).sum()} of {run.sum()} presses were left out: rows are missing for over "
             f"{1e3 * LONGEST_GAP_S:g} ms"
         )
-    return Aligned(at, usable, tuple(notes), frame)
+    return Aligned(at, usable, tuple(notes), frame, coarse)
 
 
-def _same_time(t: np.ndarray, presses: Presses) -> None:
-    inside = ((presses.onset_s >= t[0]) & (presses.end_s <= t[-1])).mean()
-    if inside >= 0.5:
-        return
-    first = float(presses.t[0])
-    raise OptionError(
-        f"the simulated forces run from {t[0]:.6g} to {t[-1]:.6g} s, and {100 * (1 - inside):.0f} % of the "
-        f"presses lie outside (they begin at {first:.6g} s): state --clock-offset, s, "
-        "which is added to the file's clock"
+def reading_error_n(step: float, presses: Presses) -> float:
+    """N rms over contact samples by which the measured force changes where it is read every `step` seconds
+    and joined by straight lines, less what its own noise makes of that."""
+    own = 1.0 / presses.sample_rate_hz
+    if step <= own:
+        return 0.0
+    net = presses.force - presses.free_air
+    off = np.zeros_like(net)
+    for part in presses.parts:
+        t = presses.t[part]
+        rows = np.arange(t[0], t[-1] + step, step)
+        for k, force in enumerate(net[part].T):
+            off[part, k] = np.interp(t, rows, np.interp(rows, t, force)) - force
+    # white noise: its own, and two thirds of that between two rows
+    noise = 5 / 3 * presses.vector_noise_n**2 * (1 - own / step)
+    return float(np.sqrt(max((off[presses.counted] ** 2).sum(axis=1).mean() - noise, 0.0)))
+
+
+def _too_coarse(step: float, presses: Presses) -> str:
+    """That rows so far apart change the force by as much as flaws differ by, in words; '' where not."""
+    net = (presses.force - presses.free_air)[presses.counted]
+    least = COARSE * Smallest.simulator.value * float(np.sqrt((net**2).sum(axis=1).mean()))
+    error = reading_error_n(step, presses)
+    if error <= least:
+        return ""
+    enough = step / 2
+    while reading_error_n(enough, presses) > least:
+        enough /= 2
+    return (
+        f"rows at {1 / step:.3g} Hz are too coarse for these presses (the measured force, read so, is off by "
+        f"{1e3 * error:.0f} mN): log at {1 / enough:.3g} Hz or more"
     )
+
+
+def _in_seconds(t: np.ndarray, presses: Presses) -> None:
+    """Refuse rows too far apart for any press, with the unit that their times may be in."""
+    step = float(np.median(np.diff(t)))
+    if step <= COLUMN["time"].high:
+        return
+    lasts, own = t[-1] - t[0], float(presses.t[-1] - presses.t[0])
+    units = {unit: parse_unit(unit).scale for unit in ("ms", "us", "ns")}
+    unit = min(units, key=lambda u: abs(np.log(lasts * units[u] / own)))
+    raise OptionError(
+        f"the rows of the simulated forces lie {step:.4g} s apart, allowed are {COLUMN['time'].high:g} s; "
+        f"they last {lasts:.4g} s and the recording's presses {own:.4g} s: are the times in {unit}? "
+        f"Then call their column 't ({unit})', or write seconds"
+    )
+
+
+def _same_time(t: np.ndarray, presses: Presses) -> list[str]:
+    """What is said of presses that the file does not reach; refuse where too few are left."""
+    inside = int(((presses.onset_s >= t[0]) & (presses.end_s <= t[-1])).sum())
+    if inside == len(presses):
+        return []
+    runs = f"the simulated forces run from {t[0]:.6g} to {t[-1]:.6g} s"
+    if inside < LEAST_PRESSES:
+        raise OptionError(
+            f"{runs}, and only {inside} of the {len(presses)} presses lie there (they go on from "
+            f"{presses.t[0]:.6g} to {presses.t[-1]:.6g} s); needed are {LEAST_PRESSES}: run the simulator "
+            "along more of the recorded path, or state --clock-offset, s, which is added to the file's clock"
+        )
+    return [f"{runs}: judged by the {inside} of {len(presses)} presses that lie there"]
 
 
 def _same_clock(t: np.ndarray, force: np.ndarray, presses: Presses) -> None:
     """Refuse a clock that another offset would fit far better."""
     clock = np.arange(presses.t[0], presses.t[-1], _GRID_S)
+    if t[-1] - t[0] > _MOST_TIMES * (clock[-1] - clock[0]):
+        return
     air = np.zeros(len(clock))
     for part in presses.parts:
         own = slice(*np.searchsorted(clock, [presses.t[part][0], presses.t[part][-1]]))
         net = np.linalg.norm(presses.force[part] - presses.free_air[part], axis=1)
         air[own] = np.interp(clock[own], presses.t[part], net)
-    size = np.interp(clock, t, np.linalg.norm(force, axis=1), left=0.0, right=0.0)
+    first = round((t[0] - clock[0]) / _GRID_S)  # of the file's samples, on the recording's grid
+    there = clock[0] + _GRID_S * (first + np.arange(int((t[-1] - t[0]) / _GRID_S) + 1))
+    size = np.interp(there, t, np.linalg.norm(force, axis=1), left=0.0, right=0.0)
     if not size.std() > 0 or not air.std() > 0:
         return
-    most = min(round(_MOST_LAG_S / _GRID_S), len(clock) // 2)
     a, b = air - air.mean(), size - size.mean()
-    length = 2 ** int(np.ceil(np.log2(2 * len(a))))
+    length = 2 ** int(np.ceil(np.log2(len(a) + len(b))))
     product = np.fft.irfft(np.fft.rfft(a, length) * np.conj(np.fft.rfft(b, length)), length)
-    lags = np.concatenate([np.arange(most + 1), np.arange(-most, 0)])
-    likeness = product[lags] / (len(a) * air.std() * size.std())
+    starts = np.arange(1 - len(b), len(a))  # where the file's first sample may lie
+    likeness = product[starts] / np.sqrt((a**2).sum() * (b**2).sum())
     best = int(np.argmax(likeness))
-    lag = lags[best] * _GRID_S
-    if abs(lag) > LAG_S and likeness[best] > likeness[0] + BETTER:
+    lag = (starts[best] - first) * _GRID_S
+    as_it_is = float(likeness[starts == first].sum())
+    if abs(lag) > LAG_S and likeness[best] > as_it_is + BETTER:
         raise OptionError(
             f"the simulated forces fit the recording {lag:+.3g} s later far better (likeness "
-            f"{likeness[best]:.2f} against {likeness[0]:.2f}): is it another clock? State "
-            f"--clock-offset {lag:.3g}, or 0 to keep it as it is"
+            f"{likeness[best]:.2f} against {as_it_is:.2f}): is it another clock? State "
+            f"--clock-offset {lag:.12g}, or 0 to keep it as it is"
         )
 
 

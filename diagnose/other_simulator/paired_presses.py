@@ -29,7 +29,7 @@ class Sides:
     """The simulation's presses beside the real ones. forward: of all its presses, with the mended signal;
     raw: (n, 3) N, local, the force as it came; rows: of the real touches; fell_s: (p,) s, from when on the
     tip had fallen through, inf where it did not; seen: what the samples themselves showed; frame: how
-    the file writes its forces."""
+    the file writes its forces; coarse: that its rows are too far apart, in words, or ''."""
 
     forward: StatedForward
     raw: np.ndarray
@@ -38,6 +38,7 @@ class Sides:
     seen: dict[str, dict[str, float]]
     notes: tuple[str, ...]
     frame: Frame = dataclasses.field(default_factory=Frame)
+    coarse: str = ""
 
 
 def pair_forces(given: Aligned, findings: Findings, stated: Stated) -> Sides:
@@ -62,7 +63,7 @@ def pair_forces(given: Aligned, findings: Findings, stated: Stated) -> Sides:
     forward = StatedForward(mended, real.places, stated, exact=real.exact).of(keep)
     fell_s = fell_s[np.searchsorted(presses.onset_s, forward.touches.onset_s)]
     keys = {name: values for name, (_, values) in seen.items()}
-    return Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes, given.frame)
+    return Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes, given.frame, given.coarse)
 
 
 def named_numerics(

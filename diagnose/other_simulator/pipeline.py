@@ -190,8 +190,16 @@ def _concluded(w: _Weighed, own: Own | None) -> SimulatedGap:
     )  # fmt: skip
     names = _by_size(w)
     candidates = [*numerics.candidates, *_unstated(w.asked.stated, numerics), *reality.candidates]
-    reasons = [*numerics.reasons, *(f"of our own model: {r}" for r in reality.reasons)]
-    answer = Answer(names, candidates, reasons, numerics.remainder or "unknown" in reality.kind)
+    coarse = w.sides.coarse
+    reasons = [
+        *([coarse] if coarse else []),
+        *numerics.reasons,
+        *(f"of our own model: {r}" for r in reality.reasons),
+    ]
+    if coarse:
+        reasons.insert(0, coarse)
+    unknown = bool(coarse) or numerics.remainder or "unknown" in reality.kind
+    answer = Answer(names, candidates, reasons, unknown)
     forward = copy.copy(findings.forward)
     kept = np.isin(forward.touches.onset_s, w.sides.forward.touches.onset_s)
     forward.touches = forward.touches.of(kept)
@@ -230,6 +238,7 @@ def _concluded(w: _Weighed, own: Own | None) -> SimulatedGap:
         gaps=w.gaps,
         simulated=w.sides.raw,
         own=None if own is None else own.at(w.asked.stated, w.weighing),
+        coarse=coarse,
         made_up=made_up(w.numerics, w.wrong, own, w.asked.stated, w.weighing, w.least_n),
     )  # fmt: skip
 

@@ -171,7 +171,8 @@ class SimulatedGap(Result):
     changes the force most first. reality: today's diagnosis of our ideal model. gaps: (n, 3) N, local frames
     of `touches`, as the parts are taken off, "simulated" first. notes: what was told of the forces. mended:
     where it was run again. own: what it has of its own at its best settings, where that was given; made_up:
-    pairs of errors of which one hides the other. `plot`: the parts as shares. `show`: the object coloured by
+    pairs of errors of which one hides the other. coarse: that its rows are too far apart for a verdict, in
+    words, or ''. `plot`: the parts as shares. `show`: the object coloured by
     the gap.
     """
 
@@ -203,6 +204,7 @@ class SimulatedGap(Result):
     mended: Mended | None = None
     own: OwnFlaws | None = None
     made_up: tuple[MadeUp, ...] = ()
+    coarse: str = ""
 
     @property
     def without_numerics_n(self) -> float:

@@ -1,11 +1,12 @@
 """Score a simulator's forces against the kit's truth. Needs numpy alone.
 
-    python score.py FORCES_DIR [--html PAGE.html]
+    python score.py FORCES_DIR [--html PAGE.html] [--at-least SHARE]
 
 FORCES_DIR holds NAME.csv for every paths/NAME.csv of the kit: columns t,fx,fy,fz (s; N on the tip, in the
 kit's frame), at any rate. A sample counts where the true force is not zero, or where there is force in air
 beyond the bound. It is within where the error's length is at most the bound. The last line is the score: the
-share of samples within the bound, mean over the cases, 0 to 1.
+share of samples within the bound, mean over the cases, 0 to 1. With --at-least the exit code is 1 where it is
+below, or a tip's file is missing.
 """
 
 import argparse
@@ -110,7 +111,7 @@ def scored(folder):
             "off_n": float(np.sqrt((all_of("error") ** 2).mean())),
             "bound_n": float(np.sqrt((all_of("bound") ** 2).mean())),
             "most_n": float(all_of("error").max()), "force_n": float(np.sqrt((true**2).mean())),
-            "notes": notes, "tips": tips,
+            "notes": notes, "tips": tips, "missing": missing,
         })  # fmt: skip
     return kit, rows
 
@@ -174,13 +175,19 @@ def page(kit, rows, score, title):
 
 
 def main(words=None):
-    """The exit code: 0, or 2 with one line on standard error."""
+    """The exit code: 0, 1 where --at-least is not met, or 2 with one line on standard error."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("forces", metavar="FORCES_DIR", type=Path, help="folder of NAME.csv (t,fx,fy,fz)")
     parser.add_argument("--html", metavar="PAGE", type=Path, help="write the page, with a curve a tip")
+    parser.add_argument(
+        "--at-least", metavar="SHARE", type=float, help="score below which the exit code is 1"
+    )
     arguments = parser.parse_args(words)
+    least = arguments.at_least
+    if least is not None and not 0 <= least <= 1:
+        parser.error(f"--at-least is {least:g}; it must be a share, 0 to 1")
     try:
         kit, rows = scored(arguments.forces)
         score = float(np.mean([row["within"] for row in rows]))
@@ -206,8 +213,13 @@ def main(words=None):
         for note in row["notes"]:
             print(f"{row['name']}: {note}")
     print("share of samples within the bound, mean over the cases:")
+    missing = least is not None and any(row["missing"] for row in rows)
+    below = least is not None and score < least
+    if below or missing:
+        why = f"{score:.4f} is below {least:g}" if below else "files are missing"
+        print(f"score.py: --at-least is not met: {why}", file=sys.stderr)
     print(f"{score:.4f}")
-    return 0
+    return int(below or missing)
 
 
 if __name__ == "__main__":

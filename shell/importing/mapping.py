@@ -198,6 +198,12 @@ def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
     return found
 
 
+def named_columns(tables: Sequence[Table], roles: Sequence[str], said: Said) -> dict[str, Column]:
+    """The columns of those roles that the names tell."""
+    guesses = {role: _guess(tables, role) for role in roles}
+    return {r: _column(r, *guess, said, guessed=True) for r, guess in guesses.items() if guess is not None}
+
+
 def time_of(table: Table, said: Said) -> Column | None:
     """A table's own column of time, by its name."""
     guess = _guess([table], "t")

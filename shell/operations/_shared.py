@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from argparse import ArgumentTypeError
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -10,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.mechanics.contact.tip import FORMS
 from palpate.mechanics.disk.surface_files import UNITS, is_surface_file
-from palpate.mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError, PalpateWarning
 from palpate.mechanics.names import number, pairs
-from palpate.mechanics.plausible import YOUNG_MODULUS
+from palpate.mechanics.plausible import EXPLORATION, YOUNG_MODULUS
 from palpate.operations._declare import argument, option
 from palpate.operations._to_argparse import finite, natural
 from palpate.render.registry import names, simulator_names
@@ -139,10 +140,22 @@ def moduli(given: Any) -> Any:
             named[name] = number(flag, name, value) if equals else _plain(word)
         given = named[""] if set(named) == {""} else named
     for name, value in given.items() if isinstance(given, Mapping) else [("", given)]:
+        of = f" of {name}" if name else ""
         if value is not None and not YOUNG_MODULUS.takes(value):
-            of = f" of {name}" if name else ""
             raise OptionError(f"--modulus{of} is {value!r}; it must be {YOUNG_MODULUS.words}")
+        if value is not None and (words := _unlikely(float(value))):
+            warnings.warn(f"--modulus{of} is {words}", PalpateWarning, stacklevel=1)
     return given
+
+
+def _unlikely(modulus_pa: float) -> str:
+    """What is odd about a modulus in Pa, with the one that may be meant; '' where a hand feels such."""
+    usual = EXPLORATION["modulus"]
+    if usual.low <= modulus_pa <= usual.high:
+        return ""
+    words = f"{modulus_pa:g} Pa; soft objects have {usual.low:g} to {usual.high:g} Pa: "
+    kilo = 1e3 * modulus_pa
+    return words + (f"in kPa? Then --modulus {kilo:g}" if usual.low <= kilo <= usual.high else "is it in Pa?")
 
 
 def _plain(word: str) -> float:

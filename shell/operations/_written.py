@@ -44,7 +44,7 @@ def typed(name: str, given: Mapping[str, Any]) -> str:
         how = written(fields[each])
         if how.positional:
             several = value if isinstance(value, tuple) else (value,)
-            operands += [shlex.quote(file_words(getattr(v, "path", v), "REC")) for v in several]
+            operands += [file_words(getattr(v, "path", v), "REC") for v in several]
         else:
             flags += _flag(flag_of(fields[each]), value, how.count == "repeat")
     return " ".join(["palpate", name, *operands, *flags])

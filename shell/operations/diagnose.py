@@ -46,7 +46,7 @@ from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
 from palpate.render.options import DOCUMENTED
 from palpate.render.registry import check_settings
-from palpate.words import unsettled_words
+from palpate.words import typed_word, unsettled_words
 
 if TYPE_CHECKING:
     from palpate.diagnosis.other_simulator.pipeline import Asked
@@ -166,8 +166,8 @@ def diagnose(
     _check(simulated, renderer, mended, presses, stated, runs)
     if baseline is not None and renderer is None and simulated is None:
         raise OptionError("--baseline is of another simulator: name it by --simulated or --renderer")
-    forces = None if simulated is None else _forces(simulated)
-    best = None if baseline is None or simulated is None else _forces(baseline)
+    forces = None if simulated is None else _forces(simulated, of_forces.simulated_unit)
+    best = None if baseline is None or simulated is None else _forces(baseline, of_forces.simulated_unit)
     if corrected and not str(corrected).endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{corrected}' must end in .csv or .csv.gz")
     source, measured = given_model(model, file), read_recording(recording)
@@ -232,10 +232,12 @@ def diagnose(
     following = []
     if apply:
         call.then(partial(_applied, own, apply))
-        following.append(f"next: feel it: palpate touch {apply}")
+        following.append(f"next: feel it: palpate touch {typed_word(apply)}")
     if corrected:
         call.then(partial(_corrected, own, corrected))
-        following.append(f"next: reconstruct what is left: palpate reconstruct {corrected} -o MODEL")
+        following.append(
+            f"next: reconstruct what is left: palpate reconstruct {typed_word(corrected)} -o MODEL"
+        )
     call.following = following or call.following
     call.then_report(result, report)
     return result
@@ -340,9 +342,10 @@ def _check(
         stated_values(stated)
 
 
-def _forces(simulated: Any) -> Any:
+def _forces(simulated: Any, unit: str | None) -> Any:
     """The simulated forces, looked at before the work."""
-    from palpate.diagnosis.other_simulator.forces import read_forces, sorted_forces
+    from palpate.diagnosis.other_simulator.forces import sorted_forces
+    from palpate.importing.simulated_forces import read_forces
 
     if isinstance(simulated, tuple | list):
         import numpy as np
@@ -351,4 +354,4 @@ def _forces(simulated: Any) -> Any:
         if t.ndim != 1 or force.shape != (len(t), 3):
             raise OptionError(f"simulated needs t (n,) and force (n, 3); got {t.shape} and {force.shape}")
         return sorted_forces(t, force, "simulated")
-    return read_forces(simulated)
+    return read_forces(simulated, unit)

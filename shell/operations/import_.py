@@ -30,6 +30,7 @@ from palpate.operations._shared import (
     seconds,
 )
 from palpate.operations._to_argparse import vector
+from palpate.words import typed_word
 
 if TYPE_CHECKING:
     from palpate.importing.imported import Imported
@@ -176,7 +177,7 @@ def import_table(
         if not dry_run:
             call.then(lambda: [f"written: {result.save(str(output))}"])
             look = "" if drawn == "none" else f"look at {drawn}, then "
-            call.following = [f"next: {look}check it: palpate check {output}"]
+            call.following = [f"next: {look}check it: palpate check {typed_word(output)}"]
     return result
 
 

@@ -4,7 +4,7 @@ The tip comes straight along --direction with its centre aimed at --at (m, devic
 object's centre of volume), goes in by --depth along the surface's normal after first touch, and comes out
 again. Next to the object it meets the support, as in 'palpate touch' (--no-support leaves it out): that is
 said, and on a model or a surface's file the exit code is 1. With --expect the curve is compared with a stored
-one: exit code 1 if the forces differ by more than --tolerance anywhere.
+one: exit code 1 if it was pressed otherwise, or the forces differ by more than --tolerance anywhere.
 """
 
 from __future__ import annotations
@@ -74,7 +74,12 @@ def press(
     expect: Annotated[
         str | None, option("a curve to compare with", metavar="CURVE.csv", reads=True, only="command")
     ] = None,
-    tolerance: Annotated[float, option("greatest difference from --expect", unit="N", only="command")] = 0.02,
+    tolerance: Annotated[
+        float | None,
+        option(
+            "greatest difference from --expect; default: 2 % of its greatest force", unit="N", only="command"
+        ),
+    ] = None,
     file: Given[MeshFileOptions],
     render: Given[RenderOptions],
     support: SupportOptions,
@@ -132,20 +137,28 @@ def press(
     return curve
 
 
-def _compared(curve: Curve, expected: Curve, tolerance: float, call: Call) -> list[str]:
-    """Whether the forces agree, in a line; the command's exit code is 1 where they differ."""
-    from palpate.render.press import greatest_difference
+def _compared(curve: Curve, expected: Curve, stated: float | None, call: Call) -> list[str]:
+    """Whether press and forces agree, in a line; the command's exit code is 1 where they differ."""
+    from palpate.render.expected import SHARE, greatest_difference, path_differences
+    from palpate.words import listed, percent
 
     worst, when = greatest_difference(curve, expected)
-    passed = worst <= tolerance
+    peak = expected.peak_force_n
+    allowed = SHARE * peak if stated is None else stated
+    otherwise = path_differences(curve, expected)
+    passed = worst <= allowed and not otherwise
     call.exit_code = call.exit_code or int(not passed)
     call.figures = {
         "difference_n": worst,
         "at_s": when,
-        "tolerance_n": tolerance,
+        "tolerance_n": allowed,
+        "same_path": not otherwise,
         "passed": passed,
     }
-    return [
-        f"{'agrees' if passed else 'differs'}: greatest difference {worst:.4g} N at {when:.4g} s, "
-        f"allowed {tolerance:g} N"
-    ]
+    of_peak = f", {percent(worst / peak, '.2g')} of its greatest force" if peak > 0 else ""
+    forces = f"greatest difference {worst:.4g} N at {when:.4g} s{of_peak}, allowed {allowed:.3g} N"
+    if otherwise:
+        return [
+            f"differs: the stored curve is of another press: {listed(otherwise)}; {forces}",
+        ]
+    return [f"{'agrees' if passed else 'differs'}: {forces}"]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.operations._declare import operation, option
+from palpate.words import typed_word
 
 if TYPE_CHECKING:
     from palpate.mechanics.recording.recording import Recording
@@ -45,9 +46,10 @@ def read_recording(
         return read(source)
     except RecordingError as error:
         if Path(source).exists() and not _described(Path(source)):
+            file = typed_word(source)
             raise RecordingError(
-                f"{error}; another program's file is brought in by 'palpate import {source} -o REC', or by "
-                f"'palpate open {source}'"
+                f"{error}; another program's file is brought in by 'palpate import {file} -o REC', or by "
+                f"'palpate open {file}'"
             ) from error
         if isinstance(error.__cause__, RecordingError) and error.__cause__.said:
             from palpate.operations._written import open_words

@@ -43,6 +43,7 @@ from palpate.servo import ServoOptions, ServoReport
 from palpate.servo.started import StartedServo
 from palpate.warm_up import OF_A_TOUCH, OF_ITS_SERVO, warming_up
 from palpate.window.session import SessionOptions, TouchSession
+from palpate.words import typed_word
 
 if TYPE_CHECKING:
     from palpate.operations._shared import ModelLike
@@ -185,7 +186,11 @@ def touch(
             picture = None if screenshot is None else Path(screenshot)
             touched = _in_window(opening, scene, seconds, guide, picture)
     if touched is not None:
-        follows = f"see what it holds: palpate check {touched.record}" if touched.record else _NOT_RECORDED
+        follows = (
+            f"see what it holds: palpate check {typed_word(touched.record)}"
+            if touched.record
+            else _NOT_RECORDED
+        )
         call.following = [f"next: {follows}"]
         call.exit_code = touched.exit_code
     return touched

@@ -199,6 +199,7 @@ PRESS = table(
     difference_n=NUMBER,
     at_s=NUMBER,
     tolerance_n=NUMBER,
+    same_path=FLAG,
     passed=FLAG,
 )
 

@@ -18,7 +18,7 @@ from palpate.show.model import facing, thing_of, usual_colourings
 from palpate.show.page import feel_step
 from palpate.show.quantities import DEPTH
 from palpate.show.view3d import Colouring, Line, Traces, View
-from palpate.words import kpa, mm, part_words, unsettled_words
+from palpate.words import kpa, mm, part_words, typed_word, unsettled_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,9 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
     if result.renderer is None:
         yield say.Headline(f"a curve that was read: {result.peak_force_n:.4g} N at most, {mm(depth)} deep")
         return
-    force = ", ".join(f"{round(float(f), 3) + 0.0:g}" for f in result.force_at(depth))
+    there = result.force_at(depth)
+    digits = max(3, 2 - int(np.floor(np.log10(np.abs(there).max()))) if there.any() else 3)
+    force = ", ".join(f"{round(float(f), digits) + 0.0:g}" for f in there)
     normal = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in np.asarray(result.normal))
     made = result.renderer.model
     if result.on_support:
@@ -60,7 +62,7 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
         yield from _solved(result.exact)
     later = "see whether it stays so: press with `-o CURVE.csv`, later with `--expect CURVE.csv`"
     if written is not None:
-        later = f"see later whether it stays so: the same press with `--expect {written}`"
+        later = f"see later whether it stays so: the same press with `--expect {typed_word(written)}`"
     feel = f"feel it: `{touched}`" if touched else None
     yield say.Next([feel or feel_step(made.path, "palpate model FILE -o MODEL"), later])
 

@@ -28,7 +28,7 @@ from palpate.show.quantities import (
 )
 from palpate.show.scenery import AZIMUTH_DEG, add_dots, add_object, draw_touched, level_axes
 from palpate.show.view3d import Colouring, Line, Thing, Traces, View
-from palpate.words import kpa, mm, part_words, sure
+from palpate.words import kpa, mm, part_words, sure_kpa
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -117,6 +117,8 @@ def story(result: Model) -> say.Story:
         f"{mm(height)} high; tip radius {mm(result.tool.tip_radius_m, '.4g')}; {presses_words(result)}; "
         f"effects: {', '.join(result.effects) or 'none'}"
     )
+    low, high = (", ".join(f"{v:.3g}" for v in f(mesh.points, axis=0)) for f in (np.min, np.max))
+    yield say.Detail(f"it lies within ({low}) to ({high}) m: `palpate press --at X,Y,Z` there")
     yield say.Detail(
         f"mesh: {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra of order {mesh.order}, "
         f"edges of {mm(result.mesh_size_m, '.4g')}"
@@ -188,7 +190,7 @@ def mended_words(model: Model) -> str:
 def modulus_words(model: Model) -> str:
     """The Young's modulus with its 95 % interval, kPa."""
     ends = model.material.young_modulus_ci95_pa
-    interval = f" ({sure(*(f'{end / 1e3:.1f}' for end in ends))})" if np.isfinite(ends).all() else ""
+    interval = f" ({sure_kpa(ends, '.1f').removesuffix(' kPa')})" if np.isfinite(ends).all() else ""
     return f"Young's modulus{part_words(model)} {kpa(model.material.young_modulus_pa)}{interval}"
 
 

@@ -22,8 +22,9 @@ from palpate.show.diagnosis.figures import curve_pictures, first_picture, press_
 from palpate.show.diagnosis.figures import view as view_of_gap
 from palpate.show.diagnosis.parameters import number, plain_key, short
 from palpate.show.diagnosis.story import goes_with
+from palpate.show.diagnosis.words import where
 from palpate.show.page import drawn
-from palpate.words import begun, force_words, percent, sentence, share_words, spaced, spoken
+from palpate.words import begun, force_words, percent, sentence, share_words, small, spaced, spoken
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -143,6 +144,9 @@ _MOST = {
 
 def verdict(result: SimulatedGap) -> str:
     """The answer in one sentence."""
+    if result.coarse:
+        told = spoken(result.effects) or "nothing"
+        return f"not settled: {result.coarse}; until then do not mend what is named: {told}"
     first = max(PARTS, key=lambda name: result.parts[name].share)
     if settled := _settled(result):
         most = f"most of the gap is numerics: {settled}"
@@ -168,6 +172,9 @@ def story(result: SimulatedGap) -> say.Story:
         yield say.Sentence(f"its forces are read as {' in '.join(read_as)}, not x,y,z in N (see the notes)")
     yield say.Next(result.advice, on=say.PAGE)
     yield from _parts(result)
+    _, there, because = where(as_diagnosis(result))
+    yield say.TextLine(f"where: {small(there)}")
+    yield say.Detail(because.replace(" (the press shown)", ""), on=say.TEXT)
     yield from (say.Sentence(words) for words in _against_its_best(result))
     if result.mended is not None:
         again = f"run again with {result.mended.settings}: {mended_words(result)}"
@@ -203,7 +210,8 @@ def _parts(result: SimulatedGap) -> say.Story:
     """How far it is off, and what of that is numerics, parameters, reality."""
     after = f"{force_words(result.gap_after_n)} once all of it is mended, at places that were not fitted"
     yield say.TextLine(
-        f"gap: simulated and measured force differ by {force_words(result.gap_before_n)} (the sensor's "
+        f"gap: simulated and measured force differ by {force_words(result.gap_before_n)}, "
+        f"{percent(result.gap_before_n / result.touches.force_rms_n)} of the measured one (the sensor's "
         f"noise: {force_words(result.noise_n)}); {after}"
     )
     yield say.Detail("its parts, and their shares of its mean square:", on=say.TEXT)
@@ -211,6 +219,8 @@ def _parts(result: SimulatedGap) -> say.Story:
     for name in PARTS:
         part = result.parts[name]
         size = f"{force_words(part.gap_n)}, {percent(part.share)}"
+        if not part.names and abs(part.share) < 0.005:
+            size = "-"
         short_names = "; ".join(_named(result, part.names, spaced))
         yield say.Detail(f"{name}, {MEANING[name]}: {size}{short_names and f': {short_names}'}", on=say.TEXT)
         meant = "; ".join(_named(result, part.names)) or "nothing is named here"
@@ -294,6 +304,8 @@ def _given(result: SimulatedGap) -> list[tuple[str, str, str, str]]:
 
 def lead(result: SimulatedGap) -> str:
     """The page's first words: how far off, and by what most; or that most of it is not explained."""
+    if result.coarse:
+        return f"Not settled: {result.coarse}."
     off, left = f"It is off by {force_words(result.gap_before_n)}", _open(result)
     most = max(part.share for part in result.parts.values())
     said = _named(result, result.effects[:2])

@@ -39,7 +39,7 @@ from palpate.show.story import (
     Title,
     Turned,
 )
-from palpate.words import ended, headline, sentence
+from palpate.words import ended, headline, sentence, typed_word
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -317,8 +317,8 @@ def _words(text: str) -> str:
 
 
 def file_words(path: str | Path | None, otherwise: str) -> str:
-    """A file as one would type it in a command: an embedded recording's name, else the path from here where
-    that is shorter; `otherwise` for None."""
+    """A file as one would type it in a command, quoted where it must be: an embedded recording's name, else
+    the path from here where that is shorter; `otherwise` for None."""
     if not path:
         return otherwise
     from palpate.scenes.embedded import embedded_names, embedded_recording
@@ -326,7 +326,7 @@ def file_words(path: str | Path | None, otherwise: str) -> str:
     name = Path(path).name.split(".")[0]
     if name in embedded_names() and embedded_recording(name).resolve().parent == Path(path).resolve().parent:
         return name
-    return min(str(path), os.path.relpath(path), key=len)
+    return typed_word(min(str(path), os.path.relpath(path), key=len))
 
 
 def feel_step(folder: str | Path | None, making: str) -> str:

@@ -19,7 +19,7 @@ from palpate.diagnosis.other_simulator.forces import (
     Forces,
     ForcesOptions,
     aligned,
-    read_forces,
+    reading_error_n,
     sorted_forces,
     spread_out,
 )
@@ -28,6 +28,7 @@ from palpate.diagnosis.other_simulator.pipeline import Asked, Base, diagnose_sim
 from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import EffectEntry
+from palpate.importing.simulated_forces import read_forces
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.effects.registry import NAMES as PHYSICAL
 from palpate.mechanics.effects.registry import effects
@@ -40,7 +41,7 @@ from palpate.mechanics.quantities import parse_unit
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.registry import create
 from palpate.render.replay import replay
-from palpate.show.other_simulator import keys_in_words, lead
+from palpate.show.other_simulator import keys_in_words, lead, verdict
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -344,7 +345,7 @@ def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):
         aligned(Forces(t, -force, "x"), presses, ForcesOptions())
     turned = aligned(Forces(t, -force, "x"), presses, ForcesOptions(simulated_force_on="object"))
     assert turned.usable.all()
-    with pytest.raises(OptionError, match="state --clock-offset"):
+    with pytest.raises(OptionError, match="State --clock-offset 1000"):
         aligned(Forces(t - 1000.0, force, "x"), presses, ForcesOptions(clock_offset_s=None))
     with pytest.raises(OptionError, match="--clock-offset"):
         aligned(Forces(t + 1.0, force, "x"), presses, ForcesOptions())
@@ -468,9 +469,77 @@ def test_files_are_read_or_refused(tmp_path):
     good.write_text("t,fx,fy,fz,note\n0,0,0,1,a\n0.1,0,0,2,b\n")
     assert read_forces(good).force[1, 2] == 2.0
     bad = tmp_path / "bad.csv"
-    bad.write_text("time,fx,fy,fz\n0,0,0,1\n")
-    with pytest.raises(RecordingError, match="lacks the columns t"):
-        read_forces(bad)
+    for rows in ("t,f\n0,1\n0.1,2\n", "fx,fy,fz\n0,0,1\n0,0,1\n"):
+        bad.write_text(rows)
+        with pytest.raises(RecordingError, match="are t, fx, fy, fz"):
+            read_forces(bad)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time;Force X (N);Force Y (N);Force Z (N)\n0,0;0,5;0,0;1,0\n0,1;0,5;0,0;2,0\n",
+        "time,Force X (N),Force Y (N),Force Z (N)\n0.0;0.5;0.0;1.0\n0.1;0.5;0.0;2.0\n",
+        "0.0,0.5,0.0,1.0\n0.1,0.5,0.0,2.0\n",
+        "t (ms),fx (mN),fy (mN),fz (mN)\n0,500,0,1000\n100,500,0,2000\n",
+    ],
+)
+def test_a_file_of_forces_is_read_under_the_names_that_import_knows(text, tmp_path):
+    (tmp_path / "forces.csv").write_text(text)
+    read = read_forces(tmp_path / "forces.csv")
+    assert read.t == pytest.approx([0.0, 0.1]) and read.notes
+    assert read.force == pytest.approx(np.array([[0.5, 0, 1], [0.5, 0, 2]]))
+
+
+def test_a_file_that_ends_early_is_judged_by_the_presses_that_it_covers(world):
+    """Its clock is right: no offset is a cure. Another clock is told though it covers some presses."""
+    recording, model, _, force, _ = world
+    t, presses = recording.t, model.presses
+    early = t < presses.end_s[9] + 0.01
+    plain = ForcesOptions()
+    found = aligned(Forces(t[early], force[early], "x"), presses, plain)
+    assert found.usable.sum() == 10 and "10 of 24 presses" in " ".join(found.notes)
+    late = presses.onset_s[12] - presses.onset_s[0]
+    with pytest.raises(OptionError, match="--clock-offset") as refused:
+        aligned(Forces(t + late, force, "x"), presses, plain)
+    offset = float(re.search(r"--clock-offset (-?[\d.]+)", str(refused.value))[1])
+    assert offset == pytest.approx(-late, abs=0.05)
+
+
+def test_the_answer_says_how_bad_against_the_force_and_where(world):
+    """A third more force is a third of it; what is not named has no size."""
+    told = str(judged(world, 1.5 * world[3]))
+    gap = next(line for line in told.splitlines() if line.startswith("gap: "))
+    assert float(re.search(r"([\d.]+)\s%", gap)[1]) == pytest.approx(50, abs=5)
+    assert any(line.startswith("where: ") for line in told.splitlines())
+    parts = [line for line in told.splitlines() if line.strip().startswith("parameters, ")]
+    assert parts[0].endswith(": -")
+
+
+def test_rows_too_far_apart_for_the_presses_settle_nothing(world):
+    """Straight lines between them would be named as flaws of the simulator."""
+    recording, model, reality, force, _ = world
+    t, presses = recording.t, model.presses
+
+    def read(step):
+        return Forces(t[::step], force[::step], "x")
+
+    fine, slow = (aligned(read(step), presses, OWN_CLOCK) for step in (2, 50))
+    assert not fine.coarse and slow.coarse
+    truth = np.column_stack([np.interp(presses.t, t, f) for f in force.T])
+    off = np.sqrt(((slow.force - truth)[presses.counted] ** 2).sum(axis=1).mean())
+    assert reading_error_n(0.1, presses) == pytest.approx(off, rel=0.25)
+    asked = Asked(read(50), stated_of({}, model), OWN_CLOCK)
+    result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    assert "unknown" in result.kind and verdict(result).startswith("not settled")
+    enough = float(re.search(r"log at ([\d.]+) Hz", result.coarse)[1])
+    assert not aligned(read(int(250 / enough)), presses, OWN_CLOCK).coarse
+
+
+def test_times_in_milliseconds_are_asked_about(world):
+    recording, model, _, force, _ = world
+    with pytest.raises(OptionError, match=r"in ms\?.*t \(ms\)"):
+        aligned(Forces(1e3 * recording.t[::8], force[::8], "x"), model.presses, ForcesOptions())
 
 
 def test_what_was_stated_is_read_over_the_models_own(world):

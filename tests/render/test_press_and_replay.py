@@ -12,7 +12,8 @@ from palpate.cli import main
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.presses.segmentation import FoundPresses, segment_recording
 from palpate.mechanics.recording.recording import Recording
-from palpate.render.press import Stroke, check_start, greatest_difference, press, read_curve, write_curve
+from palpate.render.expected import greatest_difference
+from palpate.render.press import Stroke, check_start, press, read_curve, write_curve
 from palpate.render.replay import replay, replay_error, replay_touches
 from palpate.render.scene import in_the_air
 

@@ -34,6 +34,51 @@ def test_a_curve_that_was_stored_is_met_again_and_another_law_is_told(model_fold
     assert found["depth_m"] == pytest.approx(0.003, abs=1e-6)
 
 
+def test_a_softer_object_and_another_press_do_not_pass_unasked(model_folder, tmp_path):
+    """However small the forces: what is allowed goes with the stored curve's own."""
+    stored, result = str(tmp_path / "top.csv"), tmp_path / "result.json"
+    soft = ["--modulus", "500"]
+    assert main(["press", model_folder, *DOWN, *soft, "-o", stored]) == 0
+    assert read_curve(stored).peak_force_n < 0.02
+    assert main(["press", model_folder, *DOWN, *soft, "--expect", stored]) == 0
+    again = [*DOWN, "--modulus", "550", "--expect", stored]
+    assert main(["press", model_folder, *again, "--json", str(result)]) == 1
+    told = json.loads(result.read_text())
+    assert told["same_path"] and told["tolerance_n"] < told["difference_n"]
+    assert main(["press", model_folder, *again, "--tolerance", "0.02"]) == 0
+    for other in (
+        ["--at", "0.002,0,0.03"], ["--depth", "0.0028"], ["--speed", "0.03"], ["--hold", "0.01"],
+        ["--direction", "0.05,0,-1"],
+    ):  # fmt: skip
+        pressed = ["press", model_folder, *DOWN, *soft, *other, "--expect", stored, "--tolerance", "1"]
+        assert main([*pressed, "--json", str(result)]) == 1, other
+        assert json.loads(result.read_text())["same_path"] is False
+
+
+def test_a_suggested_command_takes_a_path_with_a_space(model_folder, tmp_path, capsys):
+    import shlex
+
+    stored = str(tmp_path / "my curve.csv")
+    assert main(["press", model_folder, *DOWN, "-o", stored]) == 0
+    line = next(each for each in capsys.readouterr().out.splitlines() if "--expect" in each)
+    assert stored in shlex.split(line)
+
+
+def test_a_point_in_millimetres_is_asked_back(model_folder, capsys):
+    assert main(["press", model_folder, "--at", "10,5,30", "--direction", "1,0,0"]) == 2
+    assert "--at 0.01,0.005,0.03" in capsys.readouterr().err
+
+
+def test_a_modulus_in_kilopascals_is_asked_back_and_no_small_number_is_lost(model_folder, capsys):
+    assert main(["press", model_folder, *DOWN, "--modulus", "5"]) == 0
+    told = capsys.readouterr()
+    said = told.out.splitlines()
+    assert "kPa?" in told.err and "--modulus 5000" in told.err
+    force = float(said[0].rsplit("(", 1)[1].split(")")[0].split(",")[2])
+    assert force == pytest.approx(float(said[0].split(": ")[1].split()[0]), rel=0.02)
+    assert "modulus is 5 Pa" in said[1]
+
+
 BESIDE = ["--at", "0.05,0,0.03", "--direction", "0,0,-1", "--depth", "0.003"]  # the block ends at 0.03
 
 

@@ -27,7 +27,7 @@ from palpate.render.press import Stroke, press
 from palpate.render.scene import TouchScene, in_the_air
 from palpate.show.colours import style_sheet
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
-from palpate.words import kpa, mm
+from palpate.words import kpa, mm, typed_word
 
 SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
@@ -193,7 +193,7 @@ def button(model: Model) -> str:
     """HTML of the button. Where the object's compliance is not kept in its folder yet, which takes a while to
     compute, the button says by which command the page is made instead."""
     if not _at_hand(model):
-        folder = html.escape(str(model.path or "MODEL"))
+        folder = html.escape(typed_word(model.path or "MODEL"))
         return (
             '<details class="press-it"><summary>press it</summary><p>A page in which this object '
             "can be pressed, by mouse, finger or keyboard, in any browser: "

@@ -18,7 +18,7 @@ from palpate.show import story as say
 from palpate.show.colours import COLOURS
 from palpate.show.diagnosis.words import short_verdict
 from palpate.show.page import new_figure
-from palpate.words import counted, kpa, mn
+from palpate.words import counted, kpa, mn, typed_word
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,7 +137,11 @@ def next_steps(result: Batch) -> list[str]:
     first = next((e.row.recording for e in result.entries if e.row.status == "done"), None)
     if any(e.row.status != "done" for e in result.entries):
         return ["mend what a row names, and run the same command again; what is done is kept"]
-    feel = f"`palpate touch {result.folder / first / 'model'}`" if first else "`palpate touch OUT/NAME/model`"
+    feel = (
+        f"`palpate touch {typed_word(result.folder / first / 'model')}`"
+        if first
+        else "`palpate touch OUT/NAME/model`"
+    )
     return ["open a recording's page by its name", f"feel one: {feel}"]
 
 

@@ -71,6 +71,20 @@ def test_the_truth_scores_one_and_every_flaw_less_the_same_each_time(kit: Path, 
     assert scored(kit, kit / "examples" / flaw).stdout == once.stdout
 
 
+def test_a_score_that_fell_and_a_case_that_is_gone_fail_a_build(
+    kit: Path, right: Path, tmp_path: Path
+) -> None:
+    stiff = kit / "examples" / next(iter(FLAWS))
+    score = number(scored(kit, stiff))
+    assert scored(kit, stiff, "--at-least", f"{score - 0.01}").returncode == 0
+    assert scored(kit, stiff, "--at-least", f"{score + 0.01}").returncode == 1
+    for file in list(right.glob("*.csv"))[1:]:
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    assert scored(kit, tmp_path).returncode == 0
+    assert scored(kit, tmp_path, "--at-least", "0").returncode == 1
+    assert scored(kit, right, "--at-least", "5").returncode == 2
+
+
 def test_a_kit_is_small_the_same_every_time_and_knows_nothing_of_palpate(kit: Path, tmp_path: Path) -> None:
     again = conformance(tmp_path / "again", progress=False)
     files = {p.relative_to(kit): p.read_bytes() for p in kit.rglob("*") if p.is_file()}

@@ -92,6 +92,7 @@ def test_a_file_is_named_as_one_would_type_it(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert file_words(None, "REC") == "REC"
     assert file_words(tmp_path / "a" / "mine.csv", "REC") == str(Path("a") / "mine.csv")
+    assert file_words(tmp_path / "a b.csv", "REC") == "'a b.csv'"  # a command is pasted into a shell
     assert file_words(embedded_recording("silicone-1-cylinder"), "REC") == "silicone-1-cylinder"
 
 
