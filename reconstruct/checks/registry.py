@@ -37,6 +37,8 @@ from palpate.reconstruction.geometry.stated import (
 )
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
+from palpate.reconstruction.steps.s1_filter.signals import filtered_of
+from palpate.reconstruction.steps.s2_base import BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
 from palpate.reconstruction.steps.s3_contacts.left_out import within_slab, without_slides
@@ -111,6 +113,21 @@ def looked_at(
         found, presses = looked
     counted: Seen = () if presses is None else ((PRESSES, float(presses), np.nan),)
     return found, (*seen(samples.data), *counted)
+
+
+def no_base(recording: Recording) -> bool:
+    """Whether its geometry has to be said: none is stated, and no foot was traced."""
+    if stated_geometry(recording, GeometryOptions()).known or recording.base_model is not None:
+        return False
+    if is_points(recording):
+        return True
+    try:
+        ContactSpans(filtered_of(recording, FilterOptions.cutoff_hz)).base(BoundaryOptions())
+    except NoBaseError:
+        return True
+    except ContactError:
+        pass  # the check-up says what else is wrong
+    return False
 
 
 def _on_known(

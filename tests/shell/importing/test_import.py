@@ -446,3 +446,21 @@ def test_a_unit_that_nobody_said_is_doubted(tmp_path, world):
     assert "say --units force=mN" in str(made)
     said = pp.import_table(tmp_path / "hard.npz", tip_radius_m=TIP, units={"force": "mN"})
     assert "WARNING" not in str(said)
+
+
+def test_a_log_without_a_tracing_is_led_to_the_geometry_it_needs(tmp_path, world, capsys):
+    """Its check-up would refuse it for want of a foot."""
+    rows = np.column_stack([world["t"], world["p"], world["f"]])
+    np.savetxt(
+        tmp_path / "log.csv",
+        rows,
+        header="t [s],x [m],y [m],z [m],fx [N],fy [N],fz [N]",
+        delimiter=",",
+        comments="",
+    )
+    words = ["import", str(tmp_path / "log.csv"), "--tip-radius", str(TIP), "-o", str(tmp_path / "rec.csv")]
+    assert cli.main([*words, "--picture", "none"]) == 0
+    told = capsys.readouterr().out.partition("written:")[2]
+    assert all(flag in told for flag in ("--shape", "--slab", "--half-space")) and "palpate check" not in told
+    assert cli.main([*words, "--picture", "none", "--half-space"]) == 0
+    assert "palpate check" in capsys.readouterr().out
