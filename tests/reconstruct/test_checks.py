@@ -118,6 +118,8 @@ def test_grave_findings_refuse_unless_forced(cylinder):
     assert finding.name == "force sign" and "--force-on object" in finding.todo
     stated = dataclasses.replace(flipped, description={"recording": {"force_on": "object"}})
     assert "--force-on tool" in checked_samples(stated).found[0].todo
+    said = dataclasses.replace(flipped, description={"import": {"force_on": "object"}})
+    assert "leave that out" in checked_samples(said).found[0].todo
 
 
 def test_lesser_findings_widen_the_interval():

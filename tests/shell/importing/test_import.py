@@ -52,7 +52,7 @@ def test_units_separator_and_decimal_comma_come_from_the_file(tmp_path, world):
     (tmp_path / "log.csv").write_text("\n".join(lines), encoding="latin-1")
     made = pp.import_table(tmp_path / "log.csv", columns={"t": "Zeit"}, tip_radius_m=TIP)
     check(made.recording, world)
-    assert "x = x (mm) (guessed)" in str(made) and "t = Zeit (ms) (said)" in str(made)
+    assert "x = x (mm) (guessed, unit stated)" in str(made) and "t = Zeit (ms) (said)" in str(made)
 
 
 def test_what_was_said_is_told_from_what_was_guessed_and_a_turned_force_is_told(tmp_path, world):
@@ -62,6 +62,7 @@ def test_what_was_said_is_told_from_what_was_guessed_and_a_turned_force_is_told(
     made = pp.import_table(tmp_path / "log.npz", tip_radius_m=TIP, **said)
     for words in (
         "x = x [mm] (guessed, unit said)",
+        "t = t [s] (guessed, unit assumed)",
         "fz = fz [N] (said)",
         "on the object, as stated: turned round",
     ):
