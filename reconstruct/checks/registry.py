@@ -28,7 +28,7 @@ from palpate.reconstruction.checks.flat import flat
 from palpate.reconstruction.checks.handedness import handedness
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
-from palpate.reconstruction.checks.units import measured, settled
+from palpate.reconstruction.checks.units import asked, measured, settled
 from palpate.reconstruction.geometry.stated import (
     GeometryOptions,
     nowhere,
@@ -73,7 +73,8 @@ def checked_samples(
     """What the samples alone show; nothing of points that have no clock (quasi-static).
 
     by_hand: a hand explored a whole object. Otherwise (a slab under an indenter) only the force's direction
-    is looked at, as sizes, speeds and channels that stand still may be anything. cutoff_hz: of the low-pass.
+    is looked at, and its unit asked about, as sizes, speeds and channels that stand still may be anything.
+    cutoff_hz: of the low-pass.
     """
     if is_points(recording):
         return CheckedSamples()
@@ -81,7 +82,7 @@ def checked_samples(
         return CheckedSamples((_too_short(recording),) if by_hand else ())
     if not by_hand:
         data = Samples(recording, cutoff_hz=cutoff_hz)
-        return CheckedSamples(ordered(handedness(data)), data)
+        return CheckedSamples(ordered([*handedness(data), *asked(data)]), data)
     data, found = settled(recording, cutoff_hz)
     return CheckedSamples(ordered([*found, *(f for check in OF_SAMPLES for f in check(data))]), data)
 
