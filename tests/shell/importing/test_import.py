@@ -465,3 +465,14 @@ def test_a_log_without_a_tracing_is_led_to_the_geometry_it_needs(tmp_path, world
     assert all(flag in told for flag in ("--shape", "--slab", "--half-space")) and "palpate check" not in told
     assert cli.main([*words, "--picture", "none", "--half-space"]) == 0
     assert "palpate check" in capsys.readouterr().out
+
+
+def test_rows_slower_than_a_recording_are_put_on_a_clock_that_can_be_read(tmp_path, world):
+    rows = np.column_stack([world["p"], world["f"]])[::25]
+    header = "x [m],y [m],z [m],fx [N],fy [N],fz [N]"
+    np.savetxt(tmp_path / "log.csv", rows, header=header, delimiter=",", comments="")
+    made = pp.import_table(tmp_path / "log.csv", tip_radius_m=TIP, rate_hz=20.0, force_on="tool")
+    made.save(tmp_path / "rec.csv")
+    again = pp.read_recording(tmp_path / "rec.csv")
+    assert again.duration_s == pytest.approx(world["t"][-1], abs=0.05)
+    assert again.description["recording"]["read_rate_hz"] == pytest.approx(20.0)
