@@ -153,8 +153,10 @@ def load_scene(name: str | Path) -> Scene:
         return Scene(path.stem, "mesh", str(path.resolve()), title=path.stem)
     if str(name) in PHANTOMS:
         return Scene(path.stem, "phantom", str(name), title=path.stem)
+    missing = "" if path.exists() else f"there is no file or folder {path}, and "
     raise SceneError(
-        unknown(
+        missing
+        + unknown(
             str(name),
             "scene",
             scene_names(),

@@ -66,7 +66,7 @@ def handedness(data: Samples) -> Iterator[Finding]:
     stated = dict(data.recording.description.get("recording") or {}).get("force_on", "tool")
     whose = "tool" if stated == "object" else "object"
     if best == "-x -y -z":
-        todo = _other_side(whose)
+        todo = _other_side(whose, dict(data.recording.description.get("import") or {}).get("force_on"))
     at = [float(data.recording.t[int(i)]) for i in stretch]
     yield Finding(
         name,
@@ -140,7 +140,12 @@ def _maps() -> dict[str, np.ndarray]:
 _MAPS = _maps()
 
 
-def _other_side(whose: str) -> str:
+def _other_side(whose: str, imported: str | None = None) -> str:
+    """What to do where the force is that on the body `whose`; imported: the body that was said at import."""
+    if imported:
+        return (
+            f"it was imported with --force-on {imported}: leave that out, and import tells it from the data"
+        )
     return (
         f"it is that on the {whose}: say --force-on {whose} to palpate import or open, or "
         f'force_on = "{whose}" under [recording]'

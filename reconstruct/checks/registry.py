@@ -28,7 +28,7 @@ from palpate.reconstruction.checks.flat import flat
 from palpate.reconstruction.checks.handedness import handedness
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.support import dropped, support
-from palpate.reconstruction.checks.units import measured, settled
+from palpate.reconstruction.checks.units import asked, measured, settled
 from palpate.reconstruction.geometry.stated import (
     GeometryOptions,
     nowhere,
@@ -37,6 +37,8 @@ from palpate.reconstruction.geometry.stated import (
 )
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
+from palpate.reconstruction.steps.s1_filter.signals import filtered_of
+from palpate.reconstruction.steps.s2_base import BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
 from palpate.reconstruction.steps.s3_contacts.left_out import within_slab, without_slides
@@ -71,7 +73,8 @@ def checked_samples(
     """What the samples alone show; nothing of points that have no clock (quasi-static).
 
     by_hand: a hand explored a whole object. Otherwise (a slab under an indenter) only the force's direction
-    is looked at, as sizes, speeds and channels that stand still may be anything. cutoff_hz: of the low-pass.
+    is looked at, and its unit asked about, as sizes, speeds and channels that stand still may be anything.
+    cutoff_hz: of the low-pass.
     """
     if is_points(recording):
         return CheckedSamples()
@@ -79,7 +82,7 @@ def checked_samples(
         return CheckedSamples((_too_short(recording),) if by_hand else ())
     if not by_hand:
         data = Samples(recording, cutoff_hz=cutoff_hz)
-        return CheckedSamples(ordered(handedness(data)), data)
+        return CheckedSamples(ordered([*handedness(data), *asked(data)]), data)
     data, found = settled(recording, cutoff_hz)
     return CheckedSamples(ordered([*found, *(f for check in OF_SAMPLES for f in check(data))]), data)
 
@@ -111,6 +114,21 @@ def looked_at(
         found, presses = looked
     counted: Seen = () if presses is None else ((PRESSES, float(presses), np.nan),)
     return found, (*seen(samples.data), *counted)
+
+
+def no_base(recording: Recording) -> bool:
+    """Whether its geometry has to be said: none is stated, and no foot was traced."""
+    if stated_geometry(recording, GeometryOptions()).known or recording.base_model is not None:
+        return False
+    if is_points(recording):
+        return True
+    try:
+        ContactSpans(filtered_of(recording, FilterOptions.cutoff_hz)).base(BoundaryOptions())
+    except NoBaseError:
+        return True
+    except ContactError:
+        pass  # the check-up says what else is wrong
+    return False
 
 
 def _on_known(

@@ -67,6 +67,17 @@ def settled(recording: Recording, cutoff_hz: float) -> tuple[Samples, tuple[Find
     return data, (*found, *_beyond(measured(data)))
 
 
+def asked(data: Samples) -> Iterator[Finding]:
+    """One question about the force's unit, of an object whose geometry is stated: a machine's sizes and
+    speeds may be anything, so it refuses nothing, and stands only where the force alone is in an odd unit."""
+    seen = measured(data)
+    known, odds = _best(seen)
+    others = any(known[kind] not in _PLAIN for kind in ("time", "position", "tip"))
+    if others or known["force"] in _PLAIN or odds["force"] < SURE_ODDS:
+        return
+    yield replace(_finding(data, "force", known["force"], odds["force"], seen), error=0.0)
+
+
 def _beyond(seen: dict[str, float]) -> Iterator[Finding]:
     """A quantity that no reading of the units makes usual. (A simulation has no noise.)"""
     for name, value in seen.items():

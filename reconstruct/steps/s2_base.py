@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter1d, label
+from scipy.spatial import ConvexHull
 
 from palpate.mechanics.errors import ContactError, NoBaseError, OptionError
 from palpate.mechanics.options import option
@@ -22,6 +23,9 @@ from palpate.reconstruction.shapes.outline import (
     fit_plane,
     resampled,
 )
+
+UNTRACED = "say what is known of the object: --shape FILE, --slab M or --half-space"
+"""What goes on without a tracing."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +126,31 @@ def find_boundary(
     )
 
 
+def refuse_no_foot(boundary: Boundary, touched: np.ndarray, t: np.ndarray, tip_radius_m: float) -> None:
+    """Raises NoBaseError where what slides most like a tracing, of samples at t (n,) s, went round nothing.
+
+    touched: (k, 3) m, places of the tip's centre where it pressed. A foot has an inside, and the middle of
+    what was pressed stands over it, however far the object leans out.
+    """
+    axes = np.linalg.svd(boundary.support_normal[None])[2][1:]
+    middle = boundary.centres.mean(axis=0)
+    path = (boundary.centres - middle) @ axes.T
+    reach = float(np.median(np.linalg.norm(path, axis=1)))
+    apart = 0.0
+    if len(touched):
+        rim = ConvexHull(path).equations
+        apart = float((rim[:, :2] @ (axes @ (np.median(touched, axis=0) - middle)) + rim[:, 2]).max())
+    if apart <= 0 and reach > tip_radius_m:
+        return
+    first, last = boundary.interval
+    beside = f", and the middle of the presses is {1e3 * apart:.3g} mm beside it" if apart > 0 else ""
+    raise NoBaseError(
+        f"no foot was traced: the slide most like a tracing, {t[first]:.1f} to {t[last - 1]:.1f} s, keeps "
+        f"within {1e3 * reach:.3g} mm of its middle{beside}; {UNTRACED}; or trace the object's foot and "
+        "record again; a tracing that is there is stated by [recording] boundary_phase"
+    )
+
+
 @dataclass(frozen=True)
 class _Face:
     """What a path on the support closes in, on a grid in its plane: `distance` m of each cell from it."""
@@ -215,7 +244,7 @@ def find_interval(
             raise NoBaseError(
                 f"no contact with the support between {given[0]:.2f} and {given[1]:.2f} s (boundary_phase): "
                 "trace the object's base first, give [object] model = PATH of a model whose base stands in, "
-                "or say what is known of the object: --shape FILE, --slab M or --half-space"
+                f"or {UNTRACED}"
             )
         return inside[0][0], inside[-1][1]
     for i, (a, b) in enumerate(found):
@@ -230,7 +259,7 @@ def find_interval(
     raise NoBaseError(
         "no boundary phase found: nowhere does the tip slide further than 8 of its radii in one plane; trace "
         "the object's base first, state [recording] boundary_phase, give [object] model = PATH of a model "
-        "whose base stands in, or say what is known of the object: --shape FILE, --slab M or --half-space"
+        f"whose base stands in, or {UNTRACED}"
     )
 
 

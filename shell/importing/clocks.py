@@ -143,7 +143,8 @@ def one_clock(
     if not end > begin:
         raise RecordingError("the clocks of position and force share no time: give --offset S or auto")
     finest = max(1 / float(np.median(np.diff(t))) for t in times.values())
-    rate = said.rate_hz or (min(finest, _MOST_HZ) if finest >= SAMPLE_RATE.low else POINTS_HZ)
+    rate = said.rate_hz or min(finest, _MOST_HZ)
+    rate = rate if rate >= SAMPLE_RATE.low else POINTS_HZ  # a slower recording cannot be read
     t = begin + np.arange(int((end - begin) * rate) + 1) / rate
     even = {part: _between(t, times[part], streams[part].values) for part in ("position", "force")}
     quaternion = None

@@ -156,4 +156,5 @@ def _description(said: Said, quasi_static: bool, read_hz: float | None) -> dict[
     if read_hz is not None:
         about["read_rate_hz"] = read_hz
     tool = {} if said.tip is None else {"tip": said.tip}
-    return {"recording": about, "tool": tool, "object": dict(said.thing), "import": {}}
+    told = {} if said.force_on is None else {"force_on": said.force_on}
+    return {"recording": about, "tool": tool, "object": dict(said.thing), "import": told}

@@ -82,8 +82,8 @@ def is_on_tool(position: np.ndarray, force: np.ndarray, said: Said, notes: list[
         if sense.sure and (sense.value[0] > 0) != (said.force_on == "tool"):
             other = "object" if said.force_on == "tool" else "tool"
             notes.append(
-                f"WARNING: the force grows as the tip moves along it, not against it ({sense.words}): is a "
-                f"sign wrong, or is it --force-on {other}?"
+                f"WARNING: the force grows as the tip moves along it, not against it ({sense.words}): leave "
+                f"--force-on {said.force_on} out, or say --force-on {other}; or is a sign wrong?"
             )
         turned = "" if said.force_on == "tool" else ": turned round"
         notes.append(f"the force is that on the {said.force_on}, as stated{turned}")

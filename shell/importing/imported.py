@@ -87,6 +87,7 @@ def write_imported(
             "notes": list(understood.notes),
         },
     }
+    table["import"] |= recording.description["import"]
     if recording.force_noise_std_n is not None:
         table["sensor"] = {"force_noise_std_n": recording.force_noise_std_n}
     stem = path.name.removesuffix(".gz").removesuffix(".csv")

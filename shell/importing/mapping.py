@@ -157,8 +157,8 @@ class Column:
         own = unit_in(self.name, KIND[self.role]) if self.role in KIND else None
         unit = "" if own == self.unit else f" [{self.unit}]"
         how = "guessed" if self.guessed else "said"
-        if self.guessed and self.unit_said:
-            how = "guessed, unit said"
+        if self.guessed and (self.unit_said or self.assumed or own):
+            how += ", unit " + ("said" if self.unit_said else "assumed" if self.assumed else "stated")
         return f"{self.role} = {sign}{self.name}{unit} ({how})"
 
 

@@ -5,9 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from palpate.mechanics.errors import ContactError
+from palpate.mechanics.errors import ContactError, NoBaseError
+from palpate.reconstruction.checks.registry import check
 from palpate.reconstruction.shapes.outline import farthest_points, fit_plane, in_its_plane
-from palpate.reconstruction.steps.s2_base import BoundaryOptions, find_boundary, find_interval
+from palpate.reconstruction.steps.s2_base import BoundaryOptions, find_boundary, find_interval, refuse_no_foot
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 
 from .exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
@@ -165,3 +166,29 @@ def test_a_stated_tracing_is_touched_where_it_lies_in_its_plane_and_lifted_strok
     np.testing.assert_array_equal(in_its_plane(path, stated, 0.004), stated & ~lifted)
     nowhere = np.zeros(len(t), dtype=bool)
     assert not in_its_plane(path, nowhere, 0.004).any()
+
+
+def test_deep_presses_alone_are_no_tracing():
+    """They slide as far as a tracing: what is missing is a base, not presses."""
+    pressed, _ = explore_cylinder(without_phase=True, depth=0.012)
+    with pytest.raises(NoBaseError):
+        explore(pressed)
+    found = check(pressed)
+    assert [f.name for f in found if f.grave] == ["no base"]
+    assert {"shape", "slab_m", "half_space"} <= {name for way in found[0].ways for name in way.options}
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.2])
+def test_a_foot_has_the_presses_over_it_and_room_for_an_object(aside):
+    angle = np.linspace(0, 2 * np.pi, 3000)
+    path = np.column_stack([0.045 * np.cos(angle), 0.045 * np.sin(angle), np.full(3000, 0.005)])
+    force, touching = np.tile([0.0, 0.0, 0.5], (len(path), 1)), np.ones(len(path), dtype=bool)
+    t, pressed = np.arange(3000) / 1000, np.array([[aside, 0.0, 0.05], [aside + 0.08, 0.0, 0.02]])
+    base = find_boundary(path, force, touching, (0, len(path)), 0.005, BoundaryOptions())
+    if aside:
+        with pytest.raises(NoBaseError):
+            refuse_no_foot(base, pressed, t, 0.005)
+        return
+    refuse_no_foot(base, pressed, t, 0.005)
+    with pytest.raises(NoBaseError):
+        refuse_no_foot(base, pressed, t, 0.05)

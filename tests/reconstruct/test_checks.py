@@ -118,6 +118,8 @@ def test_grave_findings_refuse_unless_forced(cylinder):
     assert finding.name == "force sign" and "--force-on object" in finding.todo
     stated = dataclasses.replace(flipped, description={"recording": {"force_on": "object"}})
     assert "--force-on tool" in checked_samples(stated).found[0].todo
+    said = dataclasses.replace(flipped, description={"import": {"force_on": "object"}})
+    assert "leave that out" in checked_samples(said).found[0].todo
 
 
 def test_lesser_findings_widen_the_interval():
@@ -171,3 +173,12 @@ def test_a_hand_that_rests_most_of_the_time_moves_as_fast_as_it_moves(cylinder):
     assert len(resting) > 3 and len(rows) > 5 * len(recording.t)
     found = measured(Samples(rested))["speed"]
     assert found == pytest.approx(measured(Samples(recording))["speed"], rel=0.5)
+
+
+@pytest.mark.parametrize("factor", [101.97, 1 / 101.97, 1.0])
+def test_a_force_in_another_unit_is_asked_about_where_the_geometry_is_stated(cylinder, factor):
+    """A modulus 102 times off is still one that a soft object can have: nothing after it would tell."""
+    alike = {"force_on_tool": factor * cylinder[0].force_on_tool, "force_noise_std_n": None}
+    found = checked_samples(dataclasses.replace(cylinder[0], **alike), by_hand=False).found
+    assert [f.name for f in found] == ["force unit"] * (factor != 1.0)
+    assert not any(f.grave for f in found)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.compliance.stored_compliance import compliance_file, compliance_key, load_or_condense
-from palpate.mechanics.errors import FileError, PalpateWarning
+from palpate.mechanics.errors import FileError, PalpateWarning, SceneError
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress
@@ -119,3 +119,12 @@ def test_a_damaged_folder_of_the_cache_is_unpacked_again(
     (path / "mesh.vtu").write_bytes(b"nothing")
     again = build.model_of(scene, cache=tmp_path)
     assert np.array_equal(again.mesh.points, packed[0].mesh.points)
+
+
+def test_a_folder_that_is_not_there_is_called_missing(tmp_path):
+    with pytest.raises(SceneError, match="no file or folder .*M1"):
+        load_scene(tmp_path / "M1")
+    (tmp_path / "M1").write_text("")
+    with pytest.raises(SceneError) as told:
+        load_scene(tmp_path / "M1")
+    assert "no file or folder" not in str(told.value)

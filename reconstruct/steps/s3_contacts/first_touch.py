@@ -12,11 +12,18 @@ from functools import cached_property
 
 import numpy as np
 
-from palpate.mechanics.errors import ContactError, FewPressesError, LoudAirError
+from palpate.mechanics.errors import ContactError, FewPressesError, LoudAirError, NoBaseError
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import ON_SUPPORT, TimeSegment, runs
 from palpate.reconstruction.steps.s1_filter.signals import Filtered, Signals, stated_tracing
-from palpate.reconstruction.steps.s2_base import Boundary, BoundaryOptions, find_boundary, find_interval
+from palpate.reconstruction.steps.s2_base import (
+    UNTRACED,
+    Boundary,
+    BoundaryOptions,
+    find_boundary,
+    find_interval,
+    refuse_no_foot,
+)
 from palpate.reconstruction.steps.s3_contacts.cycles import Piece, cycles, found_cycles
 from palpate.reconstruction.steps.s3_contacts.force_delay import Delay, delay_by_places
 from palpate.reconstruction.steps.s3_contacts.on_support import on_it, recognised, stated
@@ -79,10 +86,22 @@ class ContactSpans:
             return 0, 0
 
     def base(self, options: BoundaryOptions) -> Boundary:
-        """Support and base outline. Raises ContactError where none is traced or the path is open."""
+        """Support and base outline. Raises ContactError where the path is open, NoBaseError where none is
+        traced, or where nobody states a tracing and what looks most like one is none."""
         signals, touching = self.filtered.signals, self.filtered.touching
-        radius = self.recording.tip_radius_m
-        return find_boundary(signals.position, signals.force, touching, self.tracing, radius, options)
+        radius, stated = self.recording.tip_radius_m, stated_tracing(self.recording) is not None
+        try:
+            found = find_boundary(signals.position, signals.force, touching, self.tracing, radius, options)
+        except NoBaseError:
+            raise
+        except ContactError as error:
+            if stated:
+                raise
+            raise NoBaseError(f"{error}; if none was traced, {UNTRACED}") from error
+        if not stated:
+            touched = signals.position[[a for a, _ in self.spans]]
+            refuse_no_foot(found, touched, self.recording.t, radius)
+        return found
 
     @cached_property
     def spans(self) -> list[tuple[int, int]]:

@@ -107,7 +107,7 @@ def _taken(result: Reconstruction) -> str:
     who = "as the recording says" if ratio == said else "as stated"
     if said is None and result.model.provenance["options"].get("poisson_ratio") is None:
         who = "assumed: --poisson-ratio sets another"
-    form = " (assumed: --tip states another form)" if recording.tip_assumed else ""
+    form = " (its form assumed: --tip states another)" if recording.tip_assumed else ""
     tip = f"a sphere of {mm(model.tool.tip_radius_m, 'g')} radius{form}"
     return f"for Poisson's ratio {ratio:.3g} ({who}), under {tip}"
 

@@ -52,7 +52,7 @@ def test_units_separator_and_decimal_comma_come_from_the_file(tmp_path, world):
     (tmp_path / "log.csv").write_text("\n".join(lines), encoding="latin-1")
     made = pp.import_table(tmp_path / "log.csv", columns={"t": "Zeit"}, tip_radius_m=TIP)
     check(made.recording, world)
-    assert "x = x (mm) (guessed)" in str(made) and "t = Zeit (ms) (said)" in str(made)
+    assert "x = x (mm) (guessed, unit stated)" in str(made) and "t = Zeit (ms) (said)" in str(made)
 
 
 def test_what_was_said_is_told_from_what_was_guessed_and_a_turned_force_is_told(tmp_path, world):
@@ -62,6 +62,7 @@ def test_what_was_said_is_told_from_what_was_guessed_and_a_turned_force_is_told(
     made = pp.import_table(tmp_path / "log.npz", tip_radius_m=TIP, **said)
     for words in (
         "x = x [mm] (guessed, unit said)",
+        "t = t [s] (guessed, unit assumed)",
         "fz = fz [N] (said)",
         "on the object, as stated: turned round",
     ):
@@ -446,3 +447,32 @@ def test_a_unit_that_nobody_said_is_doubted(tmp_path, world):
     assert "say --units force=mN" in str(made)
     said = pp.import_table(tmp_path / "hard.npz", tip_radius_m=TIP, units={"force": "mN"})
     assert "WARNING" not in str(said)
+
+
+def test_a_log_without_a_tracing_is_led_to_the_geometry_it_needs(tmp_path, world, capsys):
+    """Its check-up would refuse it for want of a foot."""
+    rows = np.column_stack([world["t"], world["p"], world["f"]])
+    np.savetxt(
+        tmp_path / "log.csv",
+        rows,
+        header="t [s],x [m],y [m],z [m],fx [N],fy [N],fz [N]",
+        delimiter=",",
+        comments="",
+    )
+    words = ["import", str(tmp_path / "log.csv"), "--tip-radius", str(TIP), "-o", str(tmp_path / "rec.csv")]
+    assert cli.main([*words, "--picture", "none"]) == 0
+    told = capsys.readouterr().out.partition("written:")[2]
+    assert all(flag in told for flag in ("--shape", "--slab", "--half-space")) and "palpate check" not in told
+    assert cli.main([*words, "--picture", "none", "--half-space"]) == 0
+    assert "palpate check" in capsys.readouterr().out
+
+
+def test_rows_slower_than_a_recording_are_put_on_a_clock_that_can_be_read(tmp_path, world):
+    rows = np.column_stack([world["p"], world["f"]])[::25]
+    header = "x [m],y [m],z [m],fx [N],fy [N],fz [N]"
+    np.savetxt(tmp_path / "log.csv", rows, header=header, delimiter=",", comments="")
+    made = pp.import_table(tmp_path / "log.csv", tip_radius_m=TIP, rate_hz=20.0, force_on="tool")
+    made.save(tmp_path / "rec.csv")
+    again = pp.read_recording(tmp_path / "rec.csv")
+    assert again.duration_s == pytest.approx(world["t"][-1], abs=0.05)
+    assert again.description["recording"]["read_rate_hz"] == pytest.approx(20.0)
