@@ -73,15 +73,15 @@ def counted(number: int, thing: str) -> str:
 
 _RENDERERS = {
     "fem": "this model",
-    "kelvin-voigt": "spring and damper",
-    "hunt-crossley": "stiffening spring",
-    "hunt-crossley-undamped": "stiffening spring, no damper",
-    "hunt-crossley-kh": "stiffening spring, one power",
+    "kelvin-voigt": "Kelvin–Voigt spring",
+    "hunt-crossley": "Hunt–Crossley spring",
+    "hunt-crossley-undamped": "Hunt–Crossley spring, no damper",
+    "hunt-crossley-kh": "Hunt–Crossley spring, one power",
 }
 
 
 def renderer_words(name: str) -> str:
-    """A renderer as a person who knows none calls it; another simulator by its name."""
+    """A renderer's one name on pages and in the window; another simulator's is its own."""
     return _RENDERERS.get(name, name)
 
 

@@ -41,12 +41,11 @@ def view_of_presses(
     colourings: Sequence[Colouring],
     lines: Sequence[Line],
     selected: int,
-    force: str = "into",
 ) -> View:
     """The object, seen from where the selected press is in front, with the curves of these presses."""
     azimuth = facing(model.support.normal, presses.normal[selected])
     traces = Traces(presses.starts, presses.depth, presses.t - presses.onset_s[presses.press], lines)
-    return View(thing_of(model), presses.point, colourings, traces, selected, azimuth, force=force)
+    return View(thing_of(model), presses.point, colourings, traces, selected, azimuth)
 
 
 def rms_by_press(presses: Presses, off: np.ndarray) -> np.ndarray:

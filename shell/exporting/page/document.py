@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.exporting.page.contents import contents, one_d_renderer, press_word
+from palpate.exporting.page.contents import ONE_D, contents, one_d_renderer, press_word
 from palpate.exporting.subject import Subject
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.errors import OptionError
@@ -27,7 +27,7 @@ from palpate.render.press import Stroke, press
 from palpate.render.scene import TouchScene, in_the_air
 from palpate.show.colours import style_sheet
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
-from palpate.words import kpa, mm
+from palpate.words import kpa, mm, renderer_words
 
 SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
@@ -62,12 +62,13 @@ def page_of(
     about["opens"] = opens
     about["view"] = [float(np.radians(AZIMUTH_DEG)), float(np.radians(ELEVATION_DEG))]
     table_title, table = _table(renderer)
+    one_d = f'<li><i class="one-d"></i>1D model ({renderer_words(ONE_D)})</li>'
     filled = {
         "name": html.escape(title or model.name),
         "summary": _summary(model),
         "style": style_sheet() + file("page.css"),
         "picture": _picture(model),
-        "one_d": '<li><i class="one-d"></i>interpolated 1D model</li>' if about["one_d"] else "",
+        "one_d": one_d if about["one_d"] else "",
         "table_title": table_title,
         "table": table,
         "word": press_word(model),
@@ -162,7 +163,7 @@ def _table(renderer: FemRenderer) -> tuple[str, str]:
     top = "".join(f'<th scope="col">{text}</th>' for text in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
     fewer = len(rows) < len(presses)
-    title = f"{len(rows)} of {len(presses)} {word} presses" if fewer else f"The {word} presses"
+    title = f"{len(rows)} of {len(presses)} {word} presses, evenly chosen" if fewer else f"The {word} presses"
     return title, f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
