@@ -319,6 +319,16 @@ def _gallery() -> list[Scene]:
     return [load_scene(name) for name in (DEFAULT, *there)]
 
 
+NO_SCREEN = "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set)"
+VIRTUAL_SCREEN = "'xvfb-run -s \"-screen 0 1280x800x24\" palpate ...'"
+
+
+def no_screen() -> bool:
+    """Whether a window would have nowhere to open."""
+    there = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return sys.platform.startswith("linux") and not there
+
+
 def _check(
     name: str,
     renderer: str | None,
@@ -341,13 +351,10 @@ def _check(
     if headless:
         if name == "mouse":
             raise DeviceError("the mouse needs the window: drop --headless, or use --device simulated")
-    elif sys.platform.startswith("linux") and not (
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
+    elif no_screen():
         raise DeviceError(
-            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): press it in a browser "
-            "(`palpate export SCENE --to page -o touch.html`), use `palpate touch --headless`, or "
-            "'xvfb-run -s \"-screen 0 1280x800x24\" palpate ...'"
+            f"{NO_SCREEN}: press it in a browser (`palpate export SCENE --to page -o touch.html`), use "
+            f"`palpate touch --headless`, or {VIRTUAL_SCREEN}"
         )
 
 
