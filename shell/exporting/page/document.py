@@ -13,6 +13,7 @@ import json
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,6 +30,9 @@ from palpate.show.colours import style_sheet
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
 from palpate.words import kpa, mm, renderer_words
 
+if TYPE_CHECKING:
+    from palpate.scenes.scene import Scene
+
 SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
 _VIRTUAL = (
@@ -39,12 +43,19 @@ _VIRTUAL = (
 
 
 def write(
-    path: Path, subject: Subject, *, opens: bool = False, progress: Progress = silent
+    path: Path,
+    subject: Subject,
+    *,
+    opens: bool = False,
+    scene: Scene | None = None,
+    progress: Progress = silent,
 ) -> tuple[str, ...]:
-    """Write the page; what it cannot say. opens: on the subject's press, unless a link names another one."""
+    """Write the page; what it cannot say. opens: on the subject's press, unless a link names another one.
+    scene: whose title and task it bears."""
     renderer = FemRenderer(subject.model, progress=progress)
     first = [*subject.top.tolist(), subject.depth_m] if opens else None
-    path.write_text(page_of(renderer, first, progress), encoding="utf-8")
+    title, task = (None, "") if scene is None else (scene.title or None, scene.task)
+    path.write_text(page_of(renderer, first, progress, title=title, task=task), encoding="utf-8")
     return (f"no {', no '.join(left_out(subject.model))}",)
 
 
@@ -54,9 +65,10 @@ def page_of(
     progress: Progress = silent,
     *,
     title: str | None = None,
+    task: str = "",
 ) -> str:
     """The whole page of a model's finite-element renderer. opens: x, y, z, depth, m, of a press that it opens
-    on. title: the model's name unless given."""
+    on. title: the model's name unless given. task: what is to be done with it, in sentences."""
     block, about = contents(renderer, progress)
     model = renderer.model
     about["opens"] = opens
@@ -65,7 +77,7 @@ def page_of(
     one_d = f'<li><i class="one-d"></i>1D model ({renderer_words(ONE_D)})</li>'
     filled = {
         "name": html.escape(title or model.name),
-        "summary": _summary(model),
+        "summary": html.escape(task and f"{task} ") + _summary(model),
         "style": style_sheet() + file("page.css"),
         "picture": _picture(model),
         "one_d": one_d if about["one_d"] else "",
