@@ -12,6 +12,7 @@ from palpate.diagnosis.explore.state import ExplorationState
 from palpate.diagnosis.explore.suggestion import Suggestion
 from palpate.operations.explore import _line
 from palpate.operations.press import _compared
+from palpate.operations.touch import _Opening
 from palpate.render.press import Curve
 from palpate.words import gathered
 
@@ -54,3 +55,19 @@ def test_what_a_file_cannot_hold_is_no_difference():
 
     assert "greatest difference" not in said(2e-11)
     assert "1.732e-06 N" in said(1e-6)
+
+
+def test_a_touch_says_what_was_made_of_an_open_surface(block):
+    """Of a mug of three bodies that overlap, `palpate model` said the volume and `palpate touch` nothing."""
+    mended = block.replaced(provenance={**block.provenance, "mended": "filled by its winding number"})
+    told = {}
+    for model in (block, mended):
+        report = SimpleNamespace(text=lambda sent: "", as_dict=dict)
+        servo, table = SimpleNamespace(failure=""), SimpleNamespace(state={}, words="")
+        session = SimpleNamespace(
+            model=model, report=lambda r=report: r, servo=servo, table=table, renderer_name="fem"
+        )
+        opening = SimpleNamespace(device="simulated", record=None)
+        run = _Opening.touched(opening, session, SimpleNamespace(title="mug", name="mug"))
+        told[model is mended] = "\n".join(run.lines())
+    assert "winding number" in told[True] and "cm³" in told[True] and "cm³" not in told[False]

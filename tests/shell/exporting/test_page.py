@@ -474,6 +474,7 @@ def test_friction_of_a_diagnosis_is_in_the_page(renderer):
     assert float(renderer.parameters.friction[0]) == MU
 
 
+@pytest.mark.slow
 def test_a_page_of_a_hidden_nodule_names_the_task(renderer, monkeypatch, tmp_path):
     """It was headed "dome", without a word of a nodule."""
     bound = {}
