@@ -41,11 +41,12 @@ def view_of_presses(
     colourings: Sequence[Colouring],
     lines: Sequence[Line],
     selected: int,
+    force: str = "into",
 ) -> View:
     """The object, seen from where the selected press is in front, with the curves of these presses."""
     azimuth = facing(model.support.normal, presses.normal[selected])
     traces = Traces(presses.starts, presses.depth, presses.t - presses.onset_s[presses.press], lines)
-    return View(thing_of(model), presses.point, colourings, traces, selected, azimuth)
+    return View(thing_of(model), presses.point, colourings, traces, selected, azimuth, force=force)
 
 
 def rms_by_press(presses: Presses, off: np.ndarray) -> np.ndarray:

@@ -355,6 +355,7 @@ function start(root) {
   colour();  // before anything is drawn: three.js compiles what draws the dots once, with colours or without
   new ResizeObserver(resize).observe(stage);
   resize();
+  if (curves) part("what").value = data.force;
   select(data.selected, false);
 }
 

@@ -32,7 +32,7 @@ _THREE = re.compile(r'.*?Object\.defineProperty\(\w+,"__esModule",\{value:!0\}\)
 @dataclass(frozen=True)
 class View:
     """An object to be turned. places: (p, 3) m, where it was touched; selected: the press shown first; angles
-    as in `object3d`, degrees."""
+    as in `object3d`, degrees; force: of the curves, first "into" the surface or "sideways"."""
 
     thing: Thing
     places: np.ndarray
@@ -41,6 +41,7 @@ class View:
     selected: int = 0
     azimuth_deg: float = AZIMUTH_DEG
     elevation_deg: float = ELEVATION_DEG
+    force: str = "into"
 
     @property
     def known(self) -> list[Colouring]:
@@ -82,6 +83,7 @@ def _data(view: View) -> dict[str, Any]:
         "azimuth": view.azimuth_deg,
         "elevation": view.elevation_deg,
         "selected": int(view.selected),
+        "force": view.force,
         "colourings": _scaled([_colouring(c, view) for c in view.known]),
         "table": {"head": head, "rows": rows},
     }
