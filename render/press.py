@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
     from palpate.render.exact import ExactPlaces, SolvedPlace
 
+WRITTEN_DIGITS = 10
 COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
 CURVE = Kind("a curve of palpate press", (",".join(COLUMNS).encode(),))
 _MARCH = 400
@@ -314,7 +315,9 @@ def write_curve(path: Path | str, curve: Curve) -> None:
     """Write `t,x,y,z,depth,fx,fy,fz` (s, m, m, N)."""
     table = np.column_stack([curve.t, curve.position, curve.depth, curve.force])
     with atomic_file(path, CURVE) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
-        np.savetxt(file, table, fmt="%.10g", delimiter=",", header=",".join(COLUMNS), comments="")
+        np.savetxt(
+            file, table, fmt=f"%.{WRITTEN_DIGITS}g", delimiter=",", header=",".join(COLUMNS), comments=""
+        )
 
 
 def read_curve(path: Path | str) -> Curve:

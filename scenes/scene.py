@@ -79,6 +79,10 @@ SCHEMA: Schema = {
 """What a scene's file may hold."""
 
 
+FIND_M = 0.008
+"""How deep one presses for what is hidden: the deeper, the more it shows."""
+
+
 @dataclass(frozen=True)
 class Scene:
     """kind, source: the object, one of OBJECT_KINDS and its name or path. Lengths m, moduli Pa.
@@ -117,6 +121,11 @@ class Scene:
                 f"a modulus by name is of the parts of a mesh's file, and '{self.source}' is a {self.kind}: "
                 "make its model anew with palpate model FILE --modulus NAME=PA"
             )
+
+    @property
+    def task(self) -> str:
+        """What is to be done with what is hidden in it; '' where nothing is."""
+        return f"{self.about} Press {1e3 * FIND_M:g} mm deep at many places." if self.find else ""
 
     @property
     def one_modulus_pa(self) -> float | None:

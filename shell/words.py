@@ -81,17 +81,35 @@ def counted(number: int, thing: str) -> str:
     return f"{number} {thing}{'s' * (number != 1)}"
 
 
+_FIGURE = re.compile(r"\d+(?:\.\d+)?")
+
+
+def gathered(reasons: Iterable[str]) -> list[tuple[str, int]]:
+    """Reasons that differ in figures alone as one, with their range, and how many there are; most first."""
+    alike: dict[str, list[list[str]]] = {}
+    for reason in reasons:
+        alike.setdefault(_FIGURE.sub("{}", reason), []).append(_FIGURE.findall(reason))
+    found = []
+    for words, figures in alike.items():
+        ends = [(min(each, key=float), max(each, key=float)) for each in zip(*figures, strict=True)]
+        ranges = iter(low if low == high else f"{low} to {high}" for low, high in ends)
+        found.append(
+            ("".join(next(ranges) if w == "{}" else w for w in re.split(r"({})", words)), len(figures))
+        )
+    return sorted(found, key=lambda each: -each[1])
+
+
 _RENDERERS = {
     "fem": "this model",
-    "kelvin-voigt": "spring and damper",
-    "hunt-crossley": "stiffening spring",
-    "hunt-crossley-undamped": "stiffening spring, no damper",
-    "hunt-crossley-kh": "stiffening spring, one power",
+    "kelvin-voigt": "Kelvin–Voigt spring",
+    "hunt-crossley": "Hunt–Crossley spring",
+    "hunt-crossley-undamped": "Hunt–Crossley spring, no damper",
+    "hunt-crossley-kh": "Hunt–Crossley spring, one power",
 }
 
 
 def renderer_words(name: str) -> str:
-    """A renderer as a person who knows none calls it; another simulator by its name."""
+    """A renderer's one name on pages and in the window; another simulator's is its own."""
     return _RENDERERS.get(name, name)
 
 

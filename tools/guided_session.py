@@ -1,9 +1,9 @@
 """Make the picture of a guided session: `docs/images/guided-session.png`.
 
 A hand on the mouse of a touch window, off screen, explores the scene of the hidden nodule as `palpate explore
---device mouse` has it: slides round the foot, then presses where the ghost stands until the guide is content.
-Four moments make the picture, row by row: half way round, the first ghost, the last one, done. It takes some
-minutes, and no screen.
+--device mouse` has it, with its goals: slides round the foot, then presses where the ghost stands until the
+guide is content. Four moments make the picture, row by row: half way round, the first ghost, the last one,
+done. It takes some minutes, and no screen.
 """
 
 from __future__ import annotations
@@ -32,8 +32,6 @@ from tools.script import script
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "guided-session.png"
 SIZE = (1600, 1000)
 """Of the window and of the picture, pixels: each moment is drawn at twice its size."""
-GOALS = GoalOptions(modulus_within=0.1, surface_within_m=0.003)
-"""Wider than what `palpate explore` asks for: a handful of presses, where that takes dozens."""
 ARCS, STEPS = 8, 40
 """Strokes round the foot, the eye behind each, and the places of a stroke."""
 BEFORE_M, STROKE_S = 0.004, 1.6
@@ -74,7 +72,7 @@ def _guided() -> Iterator[tuple[Driven, Guide]]:
         def guided(session: TouchSession) -> Guide:
             servo, nu = session.servo, session.model.material.poisson_ratio
             instrument = Instrument(servo.tip_radius_m, servo.options.rate_hz, {"poisson_ratio": nu})
-            explorer = Explorer(instrument, GOALS, poisson_ratio=nu)
+            explorer = Explorer(instrument, GoalOptions(), poisson_ratio=nu)
             return Guide(explorer, servo, session.model, session.worker, Path(folder) / "guided.csv.gz")
 
         options = SessionOptions(scene.renderer)

@@ -1,5 +1,5 @@
 """Make the pictures of pages and of comparisons in `docs/images`, by a browser: `page-demo`, `page-phone`,
-`compare-by-press`, `compare-left-out-top`.
+`compare-by-press`, `compare-left-out-foot`.
 
 The demo and the comparison are of the embedded cylinder; the phone's is the page of a diagnosis, in the dark.
 """
@@ -23,7 +23,7 @@ from tests.shell.show.browser import a_tab
 from tools.script import script
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
-REGION = "top"
+REGION = "base-band"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,8 +37,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     folder: Path = arguments.folder
     compared = pp.compare("silicone-1-cylinder", progress=False)
     _write(folder / "compare-by-press.png", drawn(draw, compared, 8, 3.2, layout=None))
-    (top,) = (r.region for r in compared.regions if r.region.name == REGION)
-    _write(folder / "compare-left-out-top.png", across_region(compared, top.members))
+    (foot,) = (r.region for r in compared.regions if r.region.name == REGION)
+    _write(folder / "compare-left-out-foot.png", across_region(compared, foot.members))
     diagnosis, folder = arguments.diagnosis.resolve(), folder.resolve()
     with tempfile.TemporaryDirectory() as work, chdir(work), a_tab(Path(work) / "profile") as tab:
         demo(window=False)

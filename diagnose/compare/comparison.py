@@ -117,6 +117,13 @@ class Comparison(Result):
         others = (push.sum() - total) / np.maximum(len(push) - count, 1)
         return rms(others[fold, None] * normal - presses.force)
 
+    @property
+    def normal_rmse_n(self) -> dict[str, float]:
+        """rms error, N, along the outward normal alone: 1D models have no other force."""
+        normal = self.presses.normal[self.presses.press]
+        off = {m: np.einsum("ij,ij->i", f - self.presses.force, normal) for m, f in self.predicted.items()}
+        return {m: float(np.sqrt((along**2).mean())) for m, along in off.items()}
+
     def wins(self, name: str) -> int:
         """On how many held-out presses the model errs least."""
         names = ("fem", *RIVALS)

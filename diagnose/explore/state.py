@@ -61,6 +61,16 @@ class ExplorationState:
         }
 
     @property
+    def asked(self) -> str:
+        """What each goal asks for: 'modulus within 5 %, surface within 2 mm'."""
+        parts = {
+            "cause": lambda goal: f"one cause at {100 * self.cause_at:g} %",
+            "modulus": lambda goal: f"modulus within {100 * goal:g} %",
+            "surface": lambda goal: f"surface within {1e3 * goal:g} mm",
+        }
+        return ", ".join(parts[goal.name](goal.goal) for goal in self.goals if goal.name in parts)
+
+    @property
     def words(self) -> str:
         """How far each goal is."""
         parts = []
@@ -74,7 +84,7 @@ class ExplorationState:
                 parts.append(f"modulus {self.modulus_pa / 1e3:.1f} kPa within {100 * goal.now:.1f} %")
             else:
                 parts.append(f"95 % of the surface within {1e3 * goal.now:.2f} mm")
-        return ", ".join(parts)
+        return ", ".join(parts) + (f" (asked: {self.asked})" if self.asked else "")
 
 
 def cause_goal(causes: Causes | None, at: float) -> GoalState:

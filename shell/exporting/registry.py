@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.extras import install_words
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from palpate.scenes.scene import Scene
 
 Writer = Callable[[Path, Subject], tuple[str, ...]]
 
@@ -149,12 +152,14 @@ def write(
     at: np.ndarray | None = None,
     depth_m: float | None = None,
     unit: str = "m",
+    scene: Scene | None = None,
     progress: Progress = silent,
 ) -> tuple[str, ...]:
     """Write a model for another program; what its format cannot say, one line each.
 
-    at, depth_m: of the press in the scene (see `subject_of`). unit: of an STL's lengths. progress: of a page,
-    whose tables take some seconds. Raises OptionError for a program or suffix that does not fit.
+    at, depth_m: of the press in the scene (see `subject_of`). unit: of an STL's lengths. scene: whose title
+    and task a page bears. progress: of a page, whose tables take some seconds. Raises OptionError for a
+    program or suffix that does not fit.
     """
     if to not in FORMATS:
         raise OptionError(f"--to is '{to}'; allowed are {', '.join(FORMATS)}")
@@ -169,7 +174,10 @@ def write(
         raise OptionError(f"--depth is {depth_m} m; it must be greater than 0")
     subject = subject_of(model, at, depth_m)
     asked = at is not None or depth_m is not None
-    more: dict[str, dict[str, Any]] = {"stl": {"unit": unit}, "page": {"opens": asked, "progress": progress}}
+    more: dict[str, dict[str, Any]] = {
+        "stl": {"unit": unit},
+        "page": {"opens": asked, "scene": scene, "progress": progress},
+    }
     chosen = partial(program.write, **more.get(to, {}))
     with atomic_file(path, program.kind) as temporary:
         notes = chosen(temporary, subject)

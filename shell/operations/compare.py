@@ -3,8 +3,8 @@ interpolated between presses (1D). With REC2, compare two recordings of one obje
 tools): their moduli, the difference, what explains it.
 
 Single places are left out of the fits, then whole regions. Of --model only the geometry is used; all else is
-fitted anew each time. Errors are root mean squares of the force vector in contact, N; bias is the share by
-which the predicted force is too large.
+fitted anew each time. Errors are root mean squares of the force vector in contact, mN (in --json N); bias is
+the share by which the predicted force is too large.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Sugge
 from palpate.diagnosis.explore.goals import GoalOptions, check_goals
 from palpate.diagnosis.explore.segments import Instrument
 from palpate.diagnosis.explore.suggestion import Explored
-from palpate.mechanics.errors import OptionError
+from palpate.mechanics.errors import DeviceError, OptionError
 from palpate.mechanics.options import check_ranges
 from palpate.mechanics.plausible import POISSON_RATIO
 from palpate.mechanics.recording.recording import read_recording
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from palpate.window.session import TouchSession
 
 
-@operation(common="complete most", progress=False)
+@operation(common="complete most modulus_within surface_within_m cause_at", progress=False)
 def explore(
     *,
     phantom: Annotated[
@@ -50,9 +50,7 @@ def explore(
     device: Annotated[
         str | None, option("explore in the touch window: mouse, or another", metavar="NAME")
     ] = None,
-    scene: Annotated[
-        str, option("with --device: what is felt", metavar="MODEL_OR_SCENE", advanced=True)
-    ] = "nodule",
+    scene: Annotated[str, option("with --device: what is felt", metavar="MODEL_OR_SCENE")] = "nodule",
     screenshot: Annotated[
         str | None, option("with --device: save the window at its end", metavar="PNG", advanced=True)
     ] = None,
@@ -79,13 +77,17 @@ def explore(
             advanced=True,
         ),
     ] = None,
-    tip_radius_m: Annotated[float, option("radius of the spherical tip", unit="m")] = 0.005,
+    tip_radius_m: Annotated[float, option("radius of the spherical tip", unit="m", advanced=True)] = 0.005,
     rate_hz: Annotated[float, option("with --robot: samples a second", unit="Hz", advanced=True)] = 1000.0,
-    poisson_ratio: Annotated[float, option("Poisson's ratio of the object")] = 0.49,
+    poisson_ratio: Annotated[float, option("Poisson's ratio of the object", advanced=True)] = 0.49,
     young_modulus_pa: Annotated[
         float | None,
         option(
-            "with --phantom: its Young's modulus; None: its own", unit="Pa", flag="--modulus", parse=float
+            "with --phantom: its Young's modulus; None: its own",
+            unit="Pa",
+            flag="--modulus",
+            parse=float,
+            advanced=True,
         ),
     ] = None,
     seed: Seed = 0,
@@ -148,7 +150,7 @@ def _explorer(
 
 
 def _in_window(begun: Begun, output: str, scene: str, given: Mapping[str, Any], call: Call) -> Explored:
-    from palpate.operations.touch import touch
+    from palpate.operations.touch import NO_SCREEN, VIRTUAL_SCREEN, no_screen, touch
     from palpate.window.guide import Guide
 
     kept: list[Explorer] = []
@@ -160,6 +162,11 @@ def _in_window(begun: Begun, output: str, scene: str, given: Mapping[str, Any], 
         return Guide(kept[-1], servo, session.model, session.worker, output)
 
     said = {name: value for name, value in given.items() if value is not None}
+    if no_screen():
+        raise DeviceError(
+            f"{NO_SCREEN}: watch a simulated robot explore (`palpate explore --phantom dome -o REC`), or use "
+            f"{VIRTUAL_SCREEN}"
+        )
     touched = touch(scene, guide=guided, **said)
     if touched is not None:
         call.out.say(*touched.lines())
@@ -182,12 +189,14 @@ def _by_robot(begun: Begun, output: str, rate_hz: float, tip_radius_m: float, nu
 def _on_phantom(begun: Begun, output: str, robot: LaboratoryRobot, most: int, call: Call) -> Explored:
     explorer = begun(robot.instrument, robot.phantom.poisson_ratio)
     robot.made = sum(s.kind == "press" for s in explorer.segments)
+    before: ExplorationState | None = None
     with call.progress("explore") as show_progress:
         while True:
             made = explorer.state.made
             show_progress(f"touch {made + 1} of at most {most}", min(made / most, 1.0))
             suggestion = explorer.suggest()
-            call.out.say(_line(suggestion, explorer.state))
+            call.out.say(_line(suggestion, explorer.state, before))
+            before = explorer.state
             if suggestion.kind == "stop":
                 break
             explorer.add(robot.carry_out(suggestion))
@@ -196,8 +205,8 @@ def _on_phantom(begun: Begun, output: str, robot: LaboratoryRobot, most: int, ca
     return explorer.explored(output, None if robot.last is None else robot.last.truth)
 
 
-def _line(suggestion: Suggestion, state: ExplorationState) -> str:
-    """One touch a line: what is known, what comes next, why."""
+def _line(suggestion: Suggestion, state: ExplorationState, before: ExplorationState | None = None) -> str:
+    """One touch a line: what is known, whether less surely than before, what comes next, why."""
     known = "nothing is known yet"
     if state.presses and state.surface:
         known = (
@@ -205,6 +214,8 @@ def _line(suggestion: Suggestion, state: ExplorationState) -> str:
             f"({state.modulus_ci95_pa[0] / 1e3:.1f} to {state.modulus_ci95_pa[1] / 1e3:.1f}), "
             f"surface within {mm(state.surface_error_m, '.1f')}"
         )
+        if before is not None and before.surface and state.surface_error_m > before.surface_error_m + 5e-5:
+            known += " (less sure than before: the last press did not fit the shape as it was known)"
     if state.causes is not None:
         likeliest, *others = state.causes.not_ruled_out(state.cause_at)
         known += f", cause: {likeliest}" + (f" or {len(others)} others" if others else "")

@@ -19,7 +19,7 @@ from palpate.exporting.registry import FORMATS, RECORDED
 from palpate.mechanics.errors import OptionError
 from palpate.operations._call import Call
 from palpate.operations._declare import operation, option
-from palpate.operations._shared import model_argument
+from palpate.operations._shared import model_argument, names_scene
 from palpate.operations._to_argparse import vector
 from palpate.operations.load import load
 
@@ -70,6 +70,7 @@ def export(
     import numpy as np
 
     from palpate.exporting.registry import write
+    from palpate.scenes.scene import load_scene
 
     if to in RECORDED:
         return _recorded(model, to, path, against, call)
@@ -77,10 +78,12 @@ def export(
         raise OptionError(
             f"--model goes with a recording, --to {' or '.join(RECORDED)}; for {to} name the MODEL itself"
         )
-    plain = load(model, progress=call.wanted)
+    plain, scene = load(model, progress=call.wanted), load_scene(model) if names_scene(model) else None
     place = None if at is None else np.asarray(at)
     with call.progress("export") as show_progress:
-        notes = write(plain, to, path, at=place, depth_m=depth_m, unit=unit, progress=show_progress)
+        notes = write(
+            plain, to, path, at=place, depth_m=depth_m, unit=unit, scene=scene, progress=show_progress
+        )
     call.then(f"written for {to}: {path}", *(f"  {note}" for note in notes))
     call.following = [f"next: {FORMATS[to].opened_by.replace('`', '').format(path=path)}"]
     call.figures = {"to": to, "path": path, "notes": list(notes)}

@@ -57,7 +57,8 @@ _NOT_RECORDED = "keep the touch, for reconstruct, compare and diagnose: --record
 @dataclass(frozen=True)
 class ServoRun:
     """What the servo did. failure: what stopped it, '' where nothing did. table: of the compliance that was
-    felt at the end, keys with units; table_words: the same, '' for the whole one."""
+    felt at the end, keys with units; table_words: the same, '' for the whole one. object_words: what was made
+    of a file of several bodies, or of an open surface."""
 
     scene: Scene
     device: str
@@ -67,13 +68,15 @@ class ServoRun:
     failure: str
     table: Table[str, Any] = field(default_factory=dict)
     table_words: str = ""
+    object_words: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """For a person."""
         recorded = [] if self.record is None else [f"recorded {self.record}"]
         report = self.report.text(sent=spec_of(self.device).has_force)
         table = [f"at the end: {self.table_words}; what is solved is kept"] if self.table_words else []
-        return [f"{self.scene.title}: {self.renderer}, {self.device}", report, *table, *recorded]
+        made_of = [f"  {words}" for words in self.object_words]
+        return [f"{self.scene.title}: {self.renderer}, {self.device}", *made_of, report, *table, *recorded]
 
     def as_json(self) -> dict[str, Any]:
         """What the servo did, keys with units."""
@@ -273,10 +276,13 @@ class _Opening:
 
     def touched(self, session: TouchSession, scene: Scene) -> ServoRun:
         """What was done."""
+        from palpate.show.model import mended_words, parts_words
+
+        made_of = tuple(filter(None, (words(session.model) for words in (parts_words, mended_words))))
         report, failure = session.report(), session.servo.failure
         return ServoRun(
             scene, self.device, session.renderer_name, report, self.record, failure, session.table.state,
-            session.table.words,
+            session.table.words, made_of,
         )  # fmt: skip
 
 
@@ -324,6 +330,16 @@ def _gallery() -> list[Scene]:
     return [load_scene(name) for name in (DEFAULT, *there)]
 
 
+NO_SCREEN = "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set)"
+VIRTUAL_SCREEN = "'xvfb-run -s \"-screen 0 1280x800x24\" palpate ...'"
+
+
+def no_screen() -> bool:
+    """Whether a window would have nowhere to open."""
+    there = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return sys.platform.startswith("linux") and not there
+
+
 def _check(
     name: str,
     renderer: str | None,
@@ -346,13 +362,10 @@ def _check(
     if headless:
         if name == "mouse":
             raise DeviceError("the mouse needs the window: drop --headless, or use --device simulated")
-    elif sys.platform.startswith("linux") and not (
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
+    elif no_screen():
         raise DeviceError(
-            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): press it in a browser "
-            "(`palpate export SCENE --to page -o touch.html`), use `palpate touch --headless`, or "
-            "'xvfb-run -s \"-screen 0 1280x800x24\" palpate ...'"
+            f"{NO_SCREEN}: press it in a browser (`palpate export SCENE --to page -o touch.html`), use "
+            f"`palpate touch --headless`, or {VIRTUAL_SCREEN}"
         )
 
 

@@ -41,6 +41,7 @@ COMPARE_MODELS = table(
         "palpations": COUNT,
         "rmse_n": named(MAYBE),
         "relative_rmse": named(MAYBE),
+        "normal_rmse_n": named(MAYBE),
         "regions": many(
             table(
                 {

@@ -9,6 +9,8 @@ import numpy as np
 
 from palpate.demo import DemoResult
 from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.presses.table import MARGIN_S, Presses
+from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.steps.s6_one_d import low_passed
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.servo.report import ServoReport
@@ -30,7 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pyvista import Plotter
 
-    from palpate.mechanics.presses.table import Presses
 
 __all__ = ["KEYS", "draw", "place", "story", "view"]
 _STAGES = {
@@ -158,17 +159,21 @@ def _meaning(result: DemoResult) -> str:
     noise = result.reconstruction.exploration.noise_n * np.sqrt(3.0)
     ratio = result.replay_rmse_n / noise
     compared = "as small as" if ratio < 1.1 else f"{ratio:.1f} times"
-    return f"That difference is {compared} the sensor's own noise ({mn(noise)})."
+    return (
+        f"That difference (the force vector, along the recorded path on the reconstructed shape) is "
+        f"{compared} the sensor's own noise ({mn(noise)}), which is in it."
+    )
 
 
 def diagnosis_words(result: DemoResult) -> str:
     """What the diagnosis found, and which of the two simulations it is about."""
     found, law = result.diagnosis, result.model.material.dent_law
     assert found is not None
-    there = {known()} if law != "linear" else set()
+    there = _has(result)
     words = (
         "The simplest simulation, of small deformations and one stiffness, is "
         f"{mn(found.gap_before_n)} off at places that it was not fitted to"
+        " (each press followed from its measured first touch: unlike above, the shape's error is left out)"
     )
     if found.effects:
         words += f"; with {spoken(found.effects)} it is {mn(found.gap_after_n)} off"
@@ -183,6 +188,11 @@ def diagnosis_words(result: DemoResult) -> str:
     if found.candidates:
         words += f" These touches cannot rule out {spoken(found.candidates, 'or')}."
     return words
+
+
+def _has(result: DemoResult) -> set[str]:
+    """Effects that the model has already."""
+    return {known()} if result.model.material.dent_law != "linear" else set()
 
 
 def sent_words(servo: ServoReport) -> str:
@@ -238,9 +248,9 @@ def view(result: DemoResult) -> View:
     """The object; each press as measured, as rendered, and as the diagnosis's ideal simulation."""
     model, recording = result.model, result.recording
     shown = low_passed(model.presses).window(0.03, 0.03)
-    at = np.searchsorted(recording.t, shown.t).clip(0, len(recording.t) - 1)
-    off = result.rendered_n[at] - shown.force
-    each = rms_by_press(shown, off)
+    at = _rows(recording, shown)
+    logged = model.presses.window(MARGIN_S, MARGIN_S)
+    each = rms_by_press(logged, (result.rendered_n - recording.force_on_tool)[_rows(recording, logged)])
     lines = [
         Line("measured", local(shown, shown.force), "measured"),
         Line("rendered", local(shown, result.rendered_n[at]), "fem"),
@@ -250,15 +260,22 @@ def view(result: DemoResult) -> View:
         ERROR,
         None,
         each,
-        "Rendered less measured, root mean square over each press; between presses what is near, "
-        "paler where it was not touched.",
+        "Rendered less measured force, a vector, as logged (the sensor's noise is in it), root mean square "
+        f"over each press; over all of them {mn(result.replay_rmse_n)}. Between presses what is near, paler "
+        "where it was not touched.",
     )
     first, *others = usual_colourings(model)
     return view_of_presses(model, shown, [first, error, *others], lines, int(np.argmax(each)))
 
 
+def _rows(recording: Recording, presses: Presses) -> np.ndarray:
+    """Of the recording, at the rows of its presses."""
+    return np.searchsorted(recording.t, presses.t).clip(0, len(recording.t) - 1)
+
+
 def _simulated(result: DemoResult, t: np.ndarray) -> list[Line]:
-    """The diagnosis's own simulations at times t (n,) s: the ideal one, and with what was found."""
+    """The diagnosis's own simulations at times t (n,) s: the ideal one, and with what was found, where the
+    model does not have all of that."""
     found = result.diagnosis
     if (
         found is None
@@ -278,7 +295,7 @@ def _simulated(result: DemoResult, t: np.ndarray) -> list[Line]:
         force = touches.local_force - residual
         seen = np.stack([np.interp(t, touches.t, axis, np.nan, np.nan) for axis in force.T], axis=1)
         lines.append(Line(name, np.where(between[:, None], np.nan, seen), kind, False))
-    return lines if found.effects else lines[:1]
+    return lines if set(found.effects) - _has(result) else lines[:1]
 
 
 def force_figure(result: DemoResult) -> Figure:

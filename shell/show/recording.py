@@ -37,7 +37,7 @@ def draw(result: Recording, ax: Axes) -> None:
     """Force over time."""
     ax.plot(result.t, result.force_n, lw=0.7, color=COLOURS["measured"])
     if result.boundary_phase is not None:
-        ax.axvspan(*result.boundary_phase, color=COLOURS["base-tracing"], zorder=0, label="phase I")
+        ax.axvspan(*result.boundary_phase, color=COLOURS["base-tracing"], zorder=0, label="tracing (phase I)")
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(result.t[0], result.t[-1]))
 

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.mechanics.model.material import Ball
+from palpate.scenes.scene import FIND_M
 from palpate.words import mm, renderer_words
 
 HALF_TIME_S = 60.0
-PRESS_M = 0.008
-"""How deep a press goes at first: the deeper, the more the nodule shows."""
+PRESS_M = FIND_M
+"""How deep a press goes at first."""
 
 
 @dataclass(frozen=True)

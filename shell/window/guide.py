@@ -209,6 +209,8 @@ class Guide:
                 f"{state.made} presses: {kpa(state.modulus_pa, '.1f')} ({low / 1e3:.1f} to "
                 f"{high / 1e3:.1f}), surface within {mm(state.surface_error_m, '.1f')}"
             )
+        if s.kind == "stop" and state.asked:
+            known += f"; asked: {state.asked}"
         what = WHAT.get(s.kind, "")
         if self._still_tracing:
             what += f" ({100 * self._tracing.share:.0f} % traced): the red part is missing"

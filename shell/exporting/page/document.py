@@ -13,10 +13,11 @@ import json
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.exporting.page.contents import contents, one_d_renderer, press_word
+from palpate.exporting.page.contents import ONE_D, contents, one_d_renderer, press_word
 from palpate.exporting.subject import Subject
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.errors import OptionError
@@ -27,7 +28,10 @@ from palpate.render.press import Stroke, press
 from palpate.render.scene import TouchScene, in_the_air
 from palpate.show.colours import style_sheet
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
-from palpate.words import kpa, mm, typed_word
+from palpate.words import kpa, mm, renderer_words, typed_word
+
+if TYPE_CHECKING:
+    from palpate.scenes.scene import Scene
 
 SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
@@ -39,12 +43,19 @@ _VIRTUAL = (
 
 
 def write(
-    path: Path, subject: Subject, *, opens: bool = False, progress: Progress = silent
+    path: Path,
+    subject: Subject,
+    *,
+    opens: bool = False,
+    scene: Scene | None = None,
+    progress: Progress = silent,
 ) -> tuple[str, ...]:
-    """Write the page; what it cannot say. opens: on the subject's press, unless a link names another one."""
+    """Write the page; what it cannot say. opens: on the subject's press, unless a link names another one.
+    scene: whose title and task it bears."""
     renderer = FemRenderer(subject.model, progress=progress)
     first = [*subject.top.tolist(), subject.depth_m] if opens else None
-    path.write_text(page_of(renderer, first, progress), encoding="utf-8")
+    title, task = (None, "") if scene is None else (scene.title or None, scene.task)
+    path.write_text(page_of(renderer, first, progress, title=title, task=task), encoding="utf-8")
     return (f"no {', no '.join(left_out(subject.model))}",)
 
 
@@ -54,20 +65,22 @@ def page_of(
     progress: Progress = silent,
     *,
     title: str | None = None,
+    task: str = "",
 ) -> str:
     """The whole page of a model's finite-element renderer. opens: x, y, z, depth, m, of a press that it opens
-    on. title: the model's name unless given."""
+    on. title: the model's name unless given. task: what is to be done with it, in sentences."""
     block, about = contents(renderer, progress)
     model = renderer.model
     about["opens"] = opens
     about["view"] = [float(np.radians(AZIMUTH_DEG)), float(np.radians(ELEVATION_DEG))]
     table_title, table = _table(renderer)
+    one_d = f'<li><i class="one-d"></i>1D model ({renderer_words(ONE_D)})</li>'
     filled = {
         "name": html.escape(title or model.name),
-        "summary": _summary(model),
+        "summary": html.escape(task and f"{task} ") + _summary(model),
         "style": style_sheet() + file("page.css"),
         "picture": _picture(model),
-        "one_d": '<li><i class="one-d"></i>interpolated 1D model</li>' if about["one_d"] else "",
+        "one_d": one_d if about["one_d"] else "",
         "table_title": table_title,
         "table": table,
         "word": press_word(model),
@@ -162,7 +175,7 @@ def _table(renderer: FemRenderer) -> tuple[str, str]:
     top = "".join(f'<th scope="col">{text}</th>' for text in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
     fewer = len(rows) < len(presses)
-    title = f"{len(rows)} of {len(presses)} {word} presses" if fewer else f"The {word} presses"
+    title = f"{len(rows)} of {len(presses)} {word} presses, evenly chosen" if fewer else f"The {word} presses"
     return title, f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from palpate.diagnosis.compare.comparison import Comparison, verdict
+import numpy as np
+
+from palpate.diagnosis.compare.comparison import Comparison, RegionResult, verdict
 from palpate.diagnosis.compare.models import MODELS, RIVALS
 from palpate.show import story as say
 from palpate.show.comparison.figures import (
@@ -23,7 +24,7 @@ from palpate.show.comparison.figures import (
 from palpate.show.page import drawn, feel_step, file_words
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import add_dots, add_object
-from palpate.words import mm, mn
+from palpate.words import listed, mm, mn
 
 if TYPE_CHECKING:
     from pyvista import Plotter
@@ -38,7 +39,7 @@ def story(result: Comparison) -> say.Story:
     yield say.Detail(meaning(result))
     yield say.Next(_next_steps(result))
     yield say.TextLine("error at held-out places, mN (in brackets: by how much the force is too large):")
-    names = list(result.rmse_n)
+    names = list(compared(result))
     yield say.Rows(
         ["  left out", "presses", *names],
         _left_out(result, names, lambda error, bias: f"{error} ({bias})" if bias else error, indent="  "),
@@ -59,6 +60,8 @@ def story(result: Comparison) -> say.Story:
         ),
         result.model,
     )
+    if untouched := _shown_region(result):
+        yield say.Section("What happens where nobody touched?", _argument(result, untouched), unfolded=True)
     yield say.Section("How large are the errors?", _how(result))
     yield say.Section("Where are they, and what was left out of the fits?", _evidence(result))
     yield say.Section("What is each model made for?", [
@@ -71,13 +74,44 @@ def story(result: Comparison) -> say.Story:
     ])  # fmt: skip
 
 
+def _shown_region(result: Comparison) -> RegionResult | None:
+    """The one that shows what shape and base tell: the lowest of the side, else the first."""
+    return next((r for r in result.regions if r.region.name == "base-band"), next(iter(result.regions), None))
+
+
+def _argument(result: Comparison, untouched: RegionResult) -> say.Story:
+    """One region without touches: what each model makes of it."""
+    region = untouched.region
+    off = listed(f"{called(m)} {_excess(untouched.bias[m])}" for m in ("fem", *RIVALS))
+    yield say.Sentence(
+        f"Left out of every fit: the {region.name} ({region.words}). A 1D model repeats the nearest "
+        f"presses there; the FEM knows shape and base. Their mean error of force: {off}"
+    )
+    yield _across(result, untouched)
+
+
+def _excess(bias: float) -> str:
+    """By how much a force is too large."""
+    return f"{round(100 * bias):+d} %"
+
+
+def _across(result: Comparison, left_out: RegionResult) -> say.Picture:
+    region = left_out.region
+    return say.Picture(
+        lambda: across_region(result, region.members),
+        f"Force at {mm(DEPTH_M, 'g')} by place with {region.name} left out of every fit; filled squares: the "
+        "left-out presses as measured.",
+    )
+
+
 def _how(result: Comparison) -> say.Story:
     yield say.Picture(
         lambda: error_bars(result), "Error at places that were held out of every fit, of each model."
     )
     yield say.Sentence(
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
-        "paths. Errors are root mean squares of the force vector; the sensor's noise alone is "
+        "paths, each from its own measured first touch, so that the shape's error is left out (a replay has "
+        "it in it). Errors are root mean squares of the force vector; the sensor's noise alone is "
         f"{mn(result.noise_n)}. The 1D models are fitted press by press and interpolated over the "
         "surface; FEM has one number for the whole object, its Young's modulus, or a smooth field of it "
         "where the presses that it is fitted to show one: they did in "
@@ -108,12 +142,10 @@ def _evidence(result: Comparison) -> say.Story:
         lambda: scatter(result),
         "Force into the surface, predicted against measured, of presses left out of the fits.",
     )
-    for region in (r.region for r in result.regions if r.region.name in ("top-centre", "base-band")):
-        yield say.Picture(
-            partial(across_region, result, region.members),
-            f"Force at {mm(DEPTH_M, 'g')} by place with {region.name} left out of every fit; filled "
-            "squares: the left-out presses as measured.",
-        )
+    shown = _shown_region(result)
+    for r in result.regions:
+        if r is not shown and r.region.name in ("top-centre", "base-band"):
+            yield _across(result, r)
 
 
 def _left_out(
@@ -128,7 +160,7 @@ def _left_out(
         ]
     ]
     for r in result.regions:
-        cells = (cell(f"{1e3 * r.rmse_n[m]:.0f}", f"{100 * r.bias[m]:+.0f} %") for m in names)
+        cells = (cell(f"{1e3 * r.rmse_n[m]:.0f}", _excess(r.bias[m])) for m in names)
         rows.append([f"{indent}{r.region.name}", int(r.region.members.sum()), *cells])
     return rows
 
@@ -144,6 +176,7 @@ KEYS: tuple[say.Key, ...] = (
     ("palpations", lambda result: len(result.presses)),
     "rmse_n",
     "relative_rmse",
+    "normal_rmse_n",
     ("regions", lambda result: [say.figures_of(r, _REGION) for r in result.regions]),
     ("wins", lambda result: {name: result.wins(name) for name in ("fem", *RIVALS)}),
     "noise_n",
@@ -194,11 +227,19 @@ def meaning(result: Comparison) -> str:
     best = min(RIVALS, key=lambda name: result.rmse_n[name])
     fem, other, noise = (1e3 * v for v in (result.rmse_n["fem"], result.rmse_n[best], result.noise_n))
     words = (
-        f"At a held-out place the FEM is {fem:.0f} mN off, {called(best)} {other:.0f} mN, of "
-        f"which the sensor's noise is {noise:.0f} mN."
+        f"At a held-out place the FEM is {fem:.0f} mN off, {called(best)} {other:.0f} mN; the sensor's "
+        f"noise, which is in both, is {noise:.0f} mN."
+    )
+    along = result.normal_rmse_n
+    best_along = min(RIVALS, key=along.__getitem__)
+    words += (
+        " A 1D model has no sideways force by definition. Along the normal alone the FEM is "
+        f"{mn(along['fem'])} off, {called(best_along)} {mn(along[best_along])}, "
+        f"{along[best_along] / max(along['fem'], 1e-12):.1f} times as much (noise: "
+        f"{mn(result.noise_n / np.sqrt(3.0))})."
     )
     wins = result.wins("fem")
     words += f" Of {len(result.presses)} presses, each left out of the fits, the FEM predicts {wins} best."
     if result.rmse_n["fem"] < 1.3 * result.noise_n:
-        words += " The FEM's share of its error is smaller than the sensor can resolve."
+        words += " More than half of the FEM's mean squared error is the sensor's noise."
     return words

@@ -16,7 +16,7 @@ from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import Colours, draw_object, spread_over
 from palpate.show.view3d import Colouring, Line, View
-from palpate.words import mm
+from palpate.words import mm, renderer_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,28 +39,20 @@ def view(result: Comparison) -> View:
     for name in names:
         shown = name in ("fem", *RIVALS)
         lines.append(Line(called(name), local(presses, result.predicted[name]), name, shown))
-    words = "Root mean square of predicted less measured force over each press, held out of every fit."
+    words = (
+        "Root mean square of predicted less measured force over each press, held out of every fit. "
+        "The colours of all models have one scale, so that they can be compared."
+    )
     colourings = [
-        Colouring(ERROR, None, result.press_rmse_n[name], words, name=f"error of {called(name)}")
-        for name in names
+        Colouring(ERROR, None, result.press_rmse_n[name], words, f"error of {called(name)}") for name in names
     ]
     colourings += usual_colourings(result.model, presses)
-    off = local(presses, result.predicted["fem"] - presses.force)[presses.parts[_worst(result)]]
-    force = "sideways" if np.linalg.norm(off[:, 1:]) > np.linalg.norm(off[:, 0]) else "into"
-    return view_of_presses(result.model, presses, colourings, lines, _worst(result), force)
+    return view_of_presses(result.model, presses, colourings, lines, _worst(result))
 
 
 def called(model: str) -> str:
     """A model's name as people write it."""
-    return _NAMES.get(model, model)
-
-
-_NAMES = {
-    "fem": "FEM",
-    HOMOGENEOUS: "FEM, one modulus",
-    "kelvin-voigt": "Kelvin–Voigt",
-    "hunt-crossley": "Hunt–Crossley",
-}
+    return {"fem": "FEM", HOMOGENEOUS: "FEM, one modulus"}.get(model) or renderer_words(model)
 
 
 def still(result: Comparison) -> Figure:
@@ -122,8 +114,8 @@ def draw(result: Comparison, ax: Axes) -> None:
             label=called(name),
         )
     ax.axhline(1e3 * result.noise_n, color=COLOURS["noise"], ls="--", lw=1, label="sensor's noise")
-    step = -(-len(order) // 20)
-    ax.set_xticks(place[::step], [str(i + 1) for i in order[::step]], fontsize=8)
+    numbered = place[:: -max(1, -(-len(order) // 50))]  # from the worst on, which has its number
+    ax.set_xticks(numbered, [str(order[i] + 1) for i in numbered], fontsize=7, rotation=90)
     ax.set(xlabel="number of the held-out press", ylabel="typical error [mN]", yscale="log")
     for axis in (ax.yaxis.set_major_formatter, ax.yaxis.set_minor_formatter):
         axis(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.5)))
@@ -173,6 +165,8 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
     measured = _at_depth(result)
     for inside, face, label in ((False, "none", "measured, fitted"), (True, None, "measured, left out")):
         chosen = family & (members == inside) & np.isfinite(measured)
+        if not chosen.any():
+            continue
         ax.plot(
             coordinate[chosen] * 1e3,
             measured[chosen],

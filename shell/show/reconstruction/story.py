@@ -40,14 +40,10 @@ from palpate.show.reconstruction.tables import (
 )
 from palpate.show.scenery import Colours, draw_object, draw_touched
 from palpate.show.view3d import Colouring, Line, View
-from palpate.words import counted, kpa, mm, mn, place_mm, sure_kpa
+from palpate.words import counted, gathered, kpa, mm, mn, place_mm, sure_kpa
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-_NAMED = 12
-"""Contacts that a terminal names."""
 
 
 def story(result: Reconstruction, beside: dict[str, Model] | None = None) -> say.Story:
@@ -126,10 +122,10 @@ def _made(result: Reconstruction) -> say.Story:
     used = len(result.model.presses)
     yield say.TextLine(f"contacts: {used + len(not_used)} found, {used} used")
     if not_used:
-        yield say.TextLine(f"{counted(len(not_used), 'contact')} not used:")
-    yield from (say.Detail(f"at {t:.2f} s: {reason}", on=say.TEXT) for t, reason in not_used[:_NAMED])
-    if (more := len(not_used) - _NAMED) > 0:
-        yield say.Detail(f"and {more} more (as_json, or --json, names all)", on=say.TEXT)
+        causes = ", ".join(f"{n} {reason}" for reason, n in gathered(reason for _, reason in not_used))
+        yield say.TextLine(
+            f"{counted(len(not_used), 'contact')} not used: {causes} (--json names each with its time)"
+        )
     if result.modulus:
         yield say.TextLine(f"modulus: {result.modulus.reason}")
     if result.exact:

@@ -15,7 +15,7 @@ import pytest
 import palpate as pp
 from palpate.devices.codecs import spacemouse
 from palpate.exporting.page.contents import force_band, shown_modes
-from palpate.exporting.page.document import button
+from palpate.exporting.page.document import button, page_of
 from palpate.exporting.page.tables import modes_of
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.files import read_model, write_model
@@ -23,6 +23,7 @@ from palpate.mechanics.model.model import Model
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.press import Stroke, press, read_curve
 from palpate.render.scene import in_the_air
+from palpate.scenes.scene import load_scene
 
 from ..show import browser
 
@@ -471,3 +472,21 @@ def test_the_button_unpacks_the_page(shown, carried, tmp_path):
 def test_friction_of_a_diagnosis_is_in_the_page(renderer):
     assert effect("friction_slip").in_material is False
     assert float(renderer.parameters.friction[0]) == MU
+
+
+@pytest.mark.slow
+def test_a_page_of_a_hidden_nodule_names_the_task(renderer, monkeypatch, tmp_path):
+    """It was headed "dome", without a word of a nodule."""
+    bound = {}
+
+    def written(model, to, path, *, scene=None, **_):
+        bound["scene"] = scene
+        return ()
+
+    monkeypatch.setattr("palpate.exporting.registry.write", written)
+    pp.export("nodule", "page", tmp_path / "nodule.html")
+    scene = bound["scene"]
+    page = page_of(renderer, title=scene.title, task=scene.task)
+    head = page.partition("<h1>")[2].partition("<canvas")[0]
+    assert "nodule" in head.partition("</h1>")[0] and "8 mm" in head
+    assert not load_scene("demo").task

@@ -18,10 +18,10 @@ SHELL = Path(__file__).resolve().parents[3] / "shell"
 _HEX = re.compile(r"[\"'](#[0-9a-fA-F]{3,8})[\"']")
 THINGS = {  # label in a picture -> thing
     "measured": "measured", "rendered": "fem", "FEM": "fem", "FEM, one modulus": "fem-homogeneous",
-    "Kelvin–Voigt": "kelvin-voigt", "Hunt–Crossley": "hunt-crossley", "simulated": "simplest",
+    "Kelvin–Voigt spring": "kelvin-voigt", "Hunt–Crossley spring": "hunt-crossley", "simulated": "simplest",
     "simulated with what was found": "found", "first touch": "touch", "first touches": "touch",
-    "peak": "peak", "phase I": "base-tracing", "sensor's noise": "noise", "measured, left out": "measured",
-    "measured, fitted": "measured", "fixed base": "base",
+    "peak": "peak", "tracing (phase I)": "base-tracing", "sensor's noise": "noise",
+    "measured, left out": "measured", "measured, fitted": "measured", "fixed base": "base",
 }  # fmt: skip
 
 

@@ -69,7 +69,7 @@ def test_renderers_are_compared(game: Game) -> None:
         game.follow(True, 0.0)
         game.follow(False, 0.0)
         game.answer(np.array([0.014 + off, 0.012, 0.0]), 0.0, renderer)
-    named = r"(this model|stiffening spring) (\d+) of 100 points in (\d+)"
+    named = r"(this model|Hunt–Crossley spring) (\d+) of 100 points in (\d+)"
     assert re.findall(named, game.lines(0.0)[1]) == [
-        ("this model", "75", "2"), ("stiffening spring", "25", "1"),
+        ("this model", "75", "2"), ("Hunt–Crossley spring", "25", "1"),
     ]  # fmt: skip

@@ -503,7 +503,7 @@ def test_two_pictures_by_one_button(driven: Driven) -> None:
     assert window.sides == 2
     both = press(driven)
     assert both.views[1].name == "hunt-crossley"
-    driven.says("N  stiffening spring")
+    driven.says("N  Hunt–Crossley spring")
     release(driven)
 
 
@@ -517,7 +517,7 @@ def test_settings_change_what_is_felt(driven: Driven) -> None:
     assert session.young_modulus_pa == pytest.approx(25e3)
     driven.click("25.0 kPa")
     assert session.young_modulus_pa == pytest.approx(20e3)
-    driven.click("stiffening spring")
+    driven.click("Hunt–Crossley spring")
     assert session.renderer_name == "hunt-crossley"
     driven.says("Friction", says=False)
     driven.click("this model")
@@ -599,6 +599,6 @@ def test_a_renderer_has_a_name_for_people_and_says_the_technical_one(driven: Dri
     driven.says("Close")
     column, aside = driven.window.boards
     tips = {item.text: item.tip for item, _ in aside.placed if item.do}
-    assert tips["this model"] == "fem" and tips["spring and damper"] == "kelvin-voigt"
+    assert tips["this model"] == "fem" and tips["Kelvin–Voigt spring"] == "kelvin-voigt"
     assert "fem" not in column.text and any("friction coefficient" in item.tip for item, _ in column.placed)
     driven.click("Close")

@@ -1,0 +1,52 @@
+"""A page says one number for one quantity: the presses' errors are of the kind of its headline."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import palpate as pp
+from palpate.diagnosis.compare.comparison import Comparison
+from palpate.render.replay import replay_error
+from palpate.show.comparison.figures import draw
+from palpate.show.demo import view
+from palpate.show.page import new_figure
+
+
+def test_the_demos_presses_and_its_headline_are_of_one_kind():
+    """The table's errors were of low-passed forces: 18 mN below a headline of 28, with the noise in it."""
+    recording, model = pp.read_recording("silicone-1-cylinder"), pp.load("demo")
+    off = np.random.default_rng(0).normal(0.0, 0.02, recording.force_on_tool.shape)
+    rendered = recording.force_on_tool + off
+    whole = replay_error(recording, model.presses, rendered)
+    found = SimpleNamespace(
+        model=model, recording=recording, rendered_n=rendered, diagnosis=None, replay_rmse_n=whole.rmse_n
+    )
+    (error,) = (c for c in view(found).colourings if "force error" in c.title)
+    samples = np.diff(model.presses.window(0.05, 0.05).starts)
+    mean = np.sqrt((samples * error.presses**2).sum() / samples.sum())
+    assert mean == pytest.approx(whole.rmse_n, rel=0.01)
+
+
+def test_every_press_of_a_chart_has_its_number_the_worst_first():
+    """Of 38 every second had one, and the worst, which the page opens on, had none."""
+    for count in (3, 38, 130):
+        errors = np.random.default_rng(count).uniform(0.01, 0.1, count)
+        each = dict.fromkeys(("fem", "kelvin-voigt", "hunt-crossley"), errors)
+        found = SimpleNamespace(press_rmse_n=each, rmse_n=dict.fromkeys(each, 0.05), fields=(), noise_n=0.02)
+        ax = new_figure(8, 3).subplots()
+        draw(found, ax)
+        told = [label.get_text() for label in ax.get_xticklabels()]
+        assert str(np.argmax(errors) + 1) in told and len(told) == (count if count < 50 else -(-count // 3))
+
+
+def test_the_error_along_the_normal_leaves_out_what_a_1d_model_cannot_have():
+    up, push = np.array([0.0, 0.0, 1.0]), np.linspace(0.0, 1.0, 20)[:, None]
+    presses = SimpleNamespace(normal=up[None], press=np.zeros(20, int), force=push * [0.5, 0.0, 1.0])
+    spring, stiff = push * [0.0, 0.0, 1.0], push * [0.5, 0.0, 1.2]
+    found = SimpleNamespace(presses=presses, predicted={"hunt-crossley": spring, "fem": stiff})
+    along = Comparison.normal_rmse_n.fget(found)
+    assert along["hunt-crossley"] == pytest.approx(0.0, abs=1e-12)
+    assert along["fem"] == pytest.approx(0.2 * np.sqrt((push**2).mean()))

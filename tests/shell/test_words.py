@@ -1,0 +1,73 @@
+"""What is said of many things at once, and of what changed."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from palpate import cli
+from palpate.diagnosis.explore.goals import GoalState
+from palpate.diagnosis.explore.state import ExplorationState
+from palpate.diagnosis.explore.suggestion import Suggestion
+from palpate.operations.explore import _line
+from palpate.operations.press import _compared
+from palpate.operations.touch import _Opening
+from palpate.render.press import Curve
+from palpate.words import gathered
+
+
+def test_reasons_that_differ_in_figures_are_one():
+    """Thirty lines 'lasts only 17 ms' followed a touch in which nothing was wrong."""
+    reasons = [*(f"lasts only {ms} ms" for ms in (17, 9, 20)), "the tip slides (3.5 mm)", "lasts only 17 ms"]
+    assert gathered(reasons) == [("lasts only 9 to 20 ms", 4), ("the tip slides (3.5 mm)", 1)]
+    assert gathered([]) == []
+
+
+def state(surface_m: float) -> ExplorationState:
+    goals = (GoalState("modulus", 0.04, 0.05), GoalState("surface", surface_m, 0.002))
+    return ExplorationState(7, 7, 30.0, 12e3, (11e3, 13e3), surface_m, "dome", goals)
+
+
+def test_a_line_says_that_less_is_known_than_before():
+    stop = Suggestion("stop", "so it is")
+    assert "less sure" in _line(stop, state(0.007), state(0.002))
+    assert "less sure" not in _line(stop, state(0.002), state(0.007))
+    assert "less sure" not in _line(stop, state(0.002))
+    assert "5 %" in state(0.001).words and "2 mm" in state(0.001).words  # what was asked for
+
+
+def test_without_a_screen_an_exploration_is_told_what_explores_without_one(tmp_path, monkeypatch, capsys):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("sys.platform", "linux")
+    assert cli.main(["explore", "--device", "mouse", "-o", str(tmp_path / "mine.csv.gz")]) == 2
+    assert "palpate explore --phantom" in capsys.readouterr().err
+
+
+def test_what_a_file_cannot_hold_is_no_difference():
+    t, push = np.linspace(0.0, 1.0, 50), np.linspace(0.0, 0.789, 50)[:, None] / 3
+    own = Curve(t, np.zeros((50, 3)), t, push * [0.1, 0.2, 1.0])
+    call = SimpleNamespace(exit_code=0, figures={})
+
+    def said(off: float) -> str:
+        return _compared(own, Curve(t, own.position, t, own.force + off), 0.02, call)[0]
+
+    assert "greatest difference" not in said(2e-11)
+    assert "1.732e-06 N" in said(1e-6)
+
+
+def test_a_touch_says_what_was_made_of_an_open_surface(block):
+    """Of a mug of three bodies that overlap, `palpate model` said the volume and `palpate touch` nothing."""
+    mended = block.replaced(provenance={**block.provenance, "mended": "filled by its winding number"})
+    told = {}
+    for model in (block, mended):
+        report = SimpleNamespace(text=lambda sent: "", as_dict=dict)
+        servo, table = SimpleNamespace(failure=""), SimpleNamespace(state={}, words="")
+        session = SimpleNamespace(
+            model=model, report=lambda r=report: r, servo=servo, table=table, renderer_name="fem"
+        )
+        opening = SimpleNamespace(device="simulated", record=None)
+        run = _Opening.touched(opening, session, SimpleNamespace(title="mug", name="mug"))
+        told[model is mended] = "\n".join(run.lines())
+    assert "winding number" in told[True] and "cm³" in told[True] and "cm³" not in told[False]
