@@ -111,7 +111,8 @@ def test_a_1d_model_that_wins_is_in_the_first_line_with_floor_and_ceiling_below(
     half = {**won.rmse_n, "hunt-crossley": 0.5 * won.rmse_n["fem"]}
     lost = dataclasses.replace(won, rmse_n=half)
     assert (
-        lost.lines()[0] == "A 1D model (Hunt–Crossley) predicts the next touch 2.0 times better than the FEM."
+        lost.lines()[0]
+        == "A 1D model (Hunt–Crossley spring) predicts the next touch 2.0 times better than the FEM."
     )
     assert not won.lines()[0].startswith("A 1D model")
     for result in (won, lost):
