@@ -105,8 +105,9 @@ def _forget(model: Path) -> None:
 def _command(name: str, *words: Any) -> dict[str, float]:
     """CPU s and peak GB of a command and its children."""
     command = module_command("palpate", *map(str, words))
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    child = subprocess.Popen(command, env=dict(os.environ, **ONE_THREAD), **quiet)
+    environment = dict(os.environ, **ONE_THREAD)
+    quiet = subprocess.DEVNULL
+    child = subprocess.Popen(command, env=environment, stdout=quiet, stderr=quiet)
     _, status, usage = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
     if child.returncode not in (0, 1):

@@ -70,7 +70,7 @@ def export(
     import numpy as np
 
     from palpate.exporting.registry import write
-    from palpate.scenes.scene import load_scene
+    from palpate.scenes.scene import Scene, load_scene
 
     if to in RECORDED:
         return _recorded(model, to, path, against, call)
@@ -78,7 +78,10 @@ def export(
         raise OptionError(
             f"--model goes with a recording, --to {' or '.join(RECORDED)}; for {to} name the MODEL itself"
         )
-    plain, scene = load(model, progress=call.wanted), load_scene(model) if names_scene(model) else None
+    plain = load(model, progress=call.wanted)
+    scene = model if isinstance(model, Scene) else None
+    if isinstance(model, str | Path) and names_scene(model):
+        scene = load_scene(model)
     place = None if at is None else np.asarray(at)
     with call.progress("export") as show_progress:
         notes = write(
