@@ -47,7 +47,7 @@ def test_without_a_screen_an_exploration_is_told_what_explores_without_one(tmp_p
 
 def test_what_a_file_cannot_hold_is_no_difference():
     t, push = np.linspace(0.0, 1.0, 50), np.linspace(0.0, 0.789, 50)[:, None] / 3
-    own = Curve(t, np.zeros((50, 3)), t, push * [0.1, 0.2, 1.0])
+    own = Curve(t, -1e-3 * np.outer(t, [0.0, 0.0, 1.0]), t, push * [0.1, 0.2, 1.0])
     call = SimpleNamespace(exit_code=0, figures={})
 
     def said(off: float) -> str:
