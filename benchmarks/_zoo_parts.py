@@ -62,7 +62,7 @@ def _shell() -> trimesh.Trimesh:
     angle = np.linspace(0, np.pi / 2, 33)
     outer = [(40 * np.cos(a), 40 * np.sin(a)) for a in angle[:-1]] + [(0.0, 40.0)]
     inner = [(0.0, 36.0)] + [(36 * np.cos(a), 36 * np.sin(a)) for a in angle[::-1][1:]]
-    return revolved([*outer[::1], *inner, outer[0]])
+    return revolved([*outer, *inner, outer[0]])
 
 
 def _drilled() -> trimesh.Trimesh:
@@ -117,12 +117,5 @@ PARTS: dict[str, Callable[[], Drawn]] = {
     "beam": lambda: whole(box((10, 10, 50))),
     "plate with a hole": lambda: whole(_drilled()),
     "ring lying": lambda: Drawn(trimesh.creation.torus(30, 10, major_sections=64), None),
-    "mushroom": lambda: whole(
-        implicit(
-            joined(rod((0, 0, -30), (0, 0, 10), 12), ball((0, 0, 14), (34, 34, 14))),
-            (44, 44, 50),
-            2.2,
-            foot=-24,
-        )
-    ),
+    "mushroom": lambda: whole(implicit(_UMBRELLA, (44, 44, 50), 2.2, foot=-24)),
 }

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from palpate.render.exact import ExactPlaces, SolvedPlace
 
 WRITTEN_DIGITS = 10
+"""Of a number in a curve's file."""
 COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
 CURVE = Kind("a curve of palpate press", (",".join(COLUMNS).encode(),))
 _MARCH = 400

@@ -191,11 +191,7 @@ def _concluded(w: _Weighed, own: Own | None) -> SimulatedGap:
     names = _by_size(w)
     candidates = [*numerics.candidates, *_unstated(w.asked.stated, numerics), *reality.candidates]
     coarse = w.sides.coarse
-    reasons = [
-        *([coarse] if coarse else []),
-        *numerics.reasons,
-        *(f"of our own model: {r}" for r in reality.reasons),
-    ]
+    reasons = [*numerics.reasons, *(f"of our own model: {r}" for r in reality.reasons)]
     if coarse:
         reasons.insert(0, coarse)
     unknown = bool(coarse) or numerics.remainder or "unknown" in reality.kind

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.shape.nearest import inside
+
 _MOST = 50
 """More labels than these number cells, not materials."""
 
@@ -42,34 +44,25 @@ def words_of(parts: Sequence[Part], moduli: Mapping[str, float] | None = None) -
 
 def shares(parts: Sequence[Part], points: np.ndarray) -> np.ndarray:
     """(m, parts) share of each cell's points (m, q, 3) m in each part; a point in none is of the largest."""
-    import pyvista
-
     flat = points.reshape(-1, 3)
     order = sorted(range(len(parts)), key=lambda k: -parts[k].volume_m3)
     owner = np.full(len(flat), order[0])
-    cloud = pyvista.PolyData(flat)
     for k in order[1:]:
-        shell = pyvista.PolyData.from_regular_faces(parts[k].vertices, parts[k].triangles)
-        found = cloud.select_interior_points(shell, check_surface=False)
-        owner[np.asarray(found["selected_points"], dtype=bool)] = k
+        owner[inside(parts[k].vertices, parts[k].triangles, flat)] = k
     return (owner.reshape(points.shape[:2])[:, :, None] == np.arange(len(parts))).mean(axis=1)
 
 
 def without_specks(shell: Any) -> tuple[Any, tuple[str, ...]]:
     """A shell of closed bodies without those that are dust beside the largest, as scanners leave it; what was
     left out. What lies inside of the largest is no dust, however small."""
-    import pyvista
-
     each = shell.split(only_watertight=True, repair=False)
     volume = np.array([abs(float(body.volume)) for body in each])
     small = np.flatnonzero(volume < _SPECK * volume.max(initial=0.0))
     if not len(small):
         return shell, ()
     largest = each[int(volume.argmax())]
-    around = pyvista.PolyData.from_regular_faces(np.asarray(largest.vertices), np.asarray(largest.faces))
-    cloud = pyvista.PolyData(np.array([each[k].vertices.mean(axis=0) for k in small]))
-    inside = cloud.select_interior_points(around, check_surface=False)["selected_points"].astype(bool)
-    gone = [each[k] for k in small[~inside]]
+    middles = np.array([each[k].vertices.mean(axis=0) for k in small])
+    gone = [each[k] for k in small[~inside(largest.vertices, largest.faces, middles)]]
     if not gone:
         return shell, ()
     nodes = {tuple(vertex) for body in gone for vertex in np.asarray(body.vertices)}

@@ -62,6 +62,15 @@ def distance(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) ->
     return np.linalg.norm(closest(vertices, triangles, points)[0] - points, axis=1)
 
 
+def inside(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k,) bool, whether points (k, 3) lie inside of a closed surface."""
+    import pyvista
+
+    around = pyvista.PolyData.from_regular_faces(np.asarray(vertices), np.asarray(triangles))
+    found = pyvista.PolyData(points).select_interior_points(around, check_surface=False)
+    return np.asarray(found["selected_points"], dtype=bool)
+
+
 def sample(vertices: np.ndarray, triangles: np.ndarray, count: int, seed: int = 0) -> np.ndarray:
     """(count, 3) points spread evenly by area over the surface; the same for the same seed."""
     generator = np.random.default_rng(seed)

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.disk.surface_files import ClosedSurface, surface_of
 from palpate.mechanics.errors import MeshError, NotClosedError, SurfaceError
-from palpate.mechanics.shape.nearest import distance, sample
+from palpate.mechanics.shape.nearest import distance, inside, sample
 from palpate.mechanics.shape.tetmesh import FACES, lone_faces
 from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
 
@@ -58,7 +58,7 @@ def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> Close
     there = sample(vertices, triangles, 1000)
     near = distance(shell.vertices, shell.faces, there) < _NEAR * diagonal
     # walls between bodies that touch, and sheets inside of one, are no surface of it
-    near |= _inside(shell, there)
+    near |= inside(shell.vertices, shell.faces, there)
     followed = near.mean() >= _FOLLOWED and shell.is_watertight
     if not followed or shell.volume < _SOLID * np.prod(np.ptp(vertices, axis=0)):
         raise refused
@@ -67,15 +67,6 @@ def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> Close
     return ClosedSurface(
         np.asarray(shell.vertices), np.asarray(shell.faces, dtype=np.int64), refused.name, (note,)
     )
-
-
-def _inside(shell: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
-    """(k,) bool, of points (k, 3)."""
-    import pyvista
-
-    around = pyvista.PolyData.from_regular_faces(np.asarray(shell.vertices), np.asarray(shell.faces))
-    found = pyvista.PolyData(points).select_interior_points(around, check_surface=False)
-    return np.asarray(found["selected_points"], dtype=bool)
 
 
 def _boundary(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

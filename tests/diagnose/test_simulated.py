@@ -532,6 +532,7 @@ def test_rows_too_far_apart_for_the_presses_settle_nothing(world):
     asked = Asked(read(50), stated_of({}, model), OWN_CLOCK)
     result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
     assert "unknown" in result.kind and verdict(result).startswith("not settled")
+    assert result.reasons.count(result.coarse) == 1
     enough = float(re.search(r"log at ([\d.]+) Hz", result.coarse)[1])
     assert not aligned(read(int(250 / enough)), presses, OWN_CLOCK).coarse
 
