@@ -57,7 +57,7 @@ def palpate_model(
         normals,
         nu,
         solver=touch_solver(model.mesh, nu, model.ratio_without_balls, balls=balls),
-        patch=LoadPatch(tip_radius_m=model.tool.tip_radius_m),
+        patch=LoadPatch(tip_radius_m=model.tool.tip_radius_m, balls=bool(balls)),
         progress=progress,
     )
     # over the modulus of what the tip meets, of which the dent is, as the renderer has it

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from palpate.mechanics.compliance.compression import own_blocks
-from palpate.mechanics.compliance.near_field import sharpening
+from palpate.mechanics.compliance.near_field import ball_law
 from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance, triangle_shapes
 from palpate.mechanics.compliance.sites import (
     SURFACE_EDGE_M,
@@ -51,22 +51,28 @@ class FineCorners:
     loose: bool
     tip_radius_m: float
 
-    def own(self, corners: np.ndarray | slice = slice(None), progress: Progress = silent) -> np.ndarray:
-        """(k, 3, 3) 1/m: displacement of the patch at each of these corners for a unit force on itself, unit
-        modulus. Where a part of the base is loose, the numbers hang on which are solved together."""
+    def own(
+        self, corners: np.ndarray | slice = slice(None), progress: Progress = silent
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """((k, 3, 3) 1/m: displacement of the patch at each of these corners for a unit force on itself, unit
+        modulus; (k,) 1/m, bracing by balls (near_field.BallLaw)). Where a part of the base is loose, the
+        numbers hang on which are solved together."""
         points, normals, width = self.points[corners], self.normals[corners], self.width_m
         each = "compliance of each place"
         own = own_blocks(
             self.solver, points, width, lambda f: progress(each, 0.3 + 0.5 * f), sampler=self._sampler
         )
         own += shape_under_one_patch(self.solver, points, normals, width)
+        bracing = np.zeros(len(points))
         if self.balls:  # what covers the whole surface is in the dent: its law, and the modulus under the tip
-            own += sharpening(
-                self.solver, points, width, self.tip_radius_m, lambda s, f: progress(s, 0.8 + 0.2 * f)
-            )
+            by_balls = ball_law(
+                self.solver, points, normals, width, self.tip_radius_m,
+                lambda s, f: progress(s, 0.8 + 0.2 * f),
+            )  # fmt: skip
+            own, bracing = own + by_balls.far, by_balls.bracing
         if self.loose:
             own -= carried_by_floor(self.solver, points, normals, width)
-        return own
+        return own, bracing
 
     @cached_property
     def _sampler(self) -> PatchSampler:
@@ -90,7 +96,7 @@ def fine_corners(
     elif solver is None:
         solver = touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold)
     nodes, triangles = corners_of(solver.mesh)
-    # with balls `sharpening` takes what they add under a narrower load
+    # with balls `ball_law` takes what they add under narrower loads
     width = patch_width(solver.mesh) if balls else load_width(solver)
     return FineCorners(
         solver, solver.mesh.points[nodes], normals_of(solver.mesh, nodes), triangles, width, bool(balls),
@@ -124,6 +130,11 @@ def interpolated(corners: np.ndarray, middles: np.ndarray, weights: np.ndarray) 
     weights (k, 3)."""
     six = np.concatenate([corners, middles], axis=1)
     return np.einsum("kc,kcab->kab", triangle_shapes(2, weights), six)
+
+
+def linear(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(k,) of the values (k, 3) at a triangle's corners each, at weights (k, 3)."""
+    return np.einsum("kc,kc->k", corners, weights)
 
 
 def less_half_space(own: np.ndarray, normals: np.ndarray, poisson_ratio: float, width_m: float) -> np.ndarray:

@@ -21,6 +21,7 @@ from palpate.mechanics.compliance.fine_corners import (
     corners_of,
     interpolated,
     less_half_space,
+    linear,
 )
 from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.compliance.sites import patch_width
@@ -32,13 +33,14 @@ from palpate.mechanics.shape.nearest import closest
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 _NO_BLOCKS = np.zeros((0, 0, 3, 3), dtype=np.float32)
-_KEPT = ("own_points", "own_normals", "own_triangles", "own_width_m", "own")
+_KEPT = ("own_points", "own_normals", "own_triangles", "own_width_m", "own", "own_bracing")
 _NO_FACTOR = np.zeros((0, 3, 0), dtype=np.float32)
 
 
 class OnDemandCompliance:
     """nodes, own_points, own_normals, own_triangles, own_width_m, poisson_ratio, blocks, factor: those of
-    SurfaceCompliance, the last two of no size; own: (v, 3, 3) 1/m, NaN where nothing was asked for yet.
+    SurfaceCompliance, the last two of no size; own: (v, 3, 3), own_bracing: (v,) 1/m, NaN where nothing was
+    asked for yet.
 
     key: of all that the numbers depend on. fine: factorises; called when something is to be solved, and what
     it gives is kept for the last object alone. coarse: factorises the mesh itself. path: of the file that
@@ -63,10 +65,11 @@ class OnDemandCompliance:
         if not arrays:
             made = self._fine
             own, width = np.full((len(made.points), 3, 3), np.nan), np.array([made.width_m])
-            arrays = dict(zip(_KEPT, (made.points, made.normals, made.triangles, width, own), strict=True))
+            new = (made.points, made.normals, made.triangles, width, own, own[:, 0, 0])
+            arrays = dict(zip(_KEPT, new, strict=True))
         self.own_points, self.own_normals = arrays["own_points"], arrays["own_normals"]
         self.own_triangles, self.own_width_m = arrays["own_triangles"], arrays["own_width_m"]
-        self.own = np.array(arrays["own"])
+        self.own, self.own_bracing = np.array(arrays["own"]), np.array(arrays["own_bracing"])
         self._middles: dict[int, np.ndarray] = {}
 
     def far_at(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -81,6 +84,11 @@ class OnDemandCompliance:
         middles = np.array([self._middles[t] for t in met])[np.searchsorted(met, triangle)]
         own = interpolated(self.own[self.own_triangles[triangle]], middles, weights)
         return less_half_space(own, normals, float(self.poisson_ratio[0]), float(self.own_width_m[0]))
+
+    def bracing_at(self, points: np.ndarray) -> np.ndarray:
+        """`SurfaceCompliance.bracing_at`, to the bit, of points that `far_at` was asked for."""
+        _, triangle, weights = closest(self.own_points, self.own_triangles, points)
+        return linear(self.own_bracing[self.own_triangles[triangle]], weights)
 
     @property
     def is_solved(self) -> np.ndarray:
@@ -126,11 +134,11 @@ class OnDemandCompliance:
         new = corners[np.isnan(self.own[corners, 0, 0])]
         if not len(new):
             return
-        self.own[new] = self._fine.own(new, progress)
+        self.own[new], self.own_bracing[new] = self._fine.own(new, progress)
         kept = self._kept()
         if kept:  # what another process added meanwhile
             more = np.isnan(self.own[:, 0, 0]) & ~np.isnan(kept["own"][:, 0, 0])
-            self.own[more] = kept["own"][more]
+            self.own[more], self.own_bracing[more] = kept["own"][more], kept["own_bracing"][more]
         arrays = {name: getattr(self, name) for name in _KEPT}
         if self._path is None:
             _unwritten.clear()

@@ -11,12 +11,12 @@ import numpy as np
 
 from palpate.mechanics.compliance.near_field import contact_width
 from palpate.mechanics.compliance.patch import PatchSampler
-from palpate.mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
+from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites, touch_solver
 from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 
-VERSION = 8
+VERSION = 9
 UNIFORM = "uniform solver"
 """Stage: the factorisation that the places were solved by, of the object of one modulus."""
 GRAIN_M = 0.0008
@@ -91,6 +91,7 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
     point, normal: (p, 3), frame: (p, 3, 3).
     """
     first, place = _shared(point, normal)
+    balls = bool(model.material.inclusions)
     stages: dict[str, Any] = {}
 
     def solve() -> dict[str, np.ndarray]:
@@ -99,7 +100,8 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
         solver = touch_solver(mesh, nu, ratio)
         if ratio is None:
             stages[UNIFORM] = solver
-        sites = touch_sites(mesh, point[first], normal[first], nu, solver=solver)
+        patch = LoadPatch(tip_radius_m=model.tool.tip_radius_m, balls=True) if balls else LoadPatch()
+        sites = touch_sites(mesh, point[first], normal[first], nu, solver=solver, patch=patch)
         return {"far": sites.far, "curvature": sites.curvature, "bracing": sites.bracing}
 
     sites = _stored("sites", model, point, normal, solve)
@@ -135,5 +137,6 @@ def _stored(
         name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, model.element_ratio,
         "" if mesh.shape is None else mesh.shape.key,
         model.material.poisson_ratio, point, normal,
+        *([model.tool.tip_radius_m] if model.material.inclusions else []),
     )  # fmt: skip
     return load_or_build(path, key, build)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.compression import own_blocks
-from palpate.mechanics.compliance.near_field import contact_width, sharpening
+from palpate.mechanics.compliance.near_field import ball_law, contact_width, sharpening
 from palpate.mechanics.compliance.patch import half_space_compliance, usual_width
 from palpate.mechanics.contact.dent import ellipse_curvature
 from palpate.mechanics.contact.depth_factors import DepthFactors
@@ -37,8 +37,9 @@ class TouchSites:
     far: (k, 3, 3) far-field compliance, 1/m: displacement of the patch a unit force, less that of a
     half-space.
     patch_width_m, poisson_ratio: what they hold for.
-    bracing: (k,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges); none
-    unless given. factors: of the k, on the force of the law that they were solved beside, or None.
+    bracing: (k,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges) and a
+    stiff ball makes them softer than its far field has it (BallLaw); none unless given. factors: of the k, on
+    the force of the law that they were solved beside, or None.
     """
 
     points: np.ndarray
@@ -78,11 +79,13 @@ class TouchSites:
 
 @dataclass(frozen=True)
 class LoadPatch:
-    """How the load of a touch is spread. width_m: None takes `load_width`. tip_radius_m: only matters where
-    the modulus varies close below the surface (mechanics.compliance.near_field)."""
+    """How the load of a touch is spread. width_m: None takes `load_width`. tip_radius_m, balls: only matter
+    where the modulus varies close below the surface (mechanics.compliance.near_field); balls: whether it
+    does by balls, which are felt by the depth of a touch."""
 
     width_m: float | None = None
     tip_radius_m: float = USUAL_TIP_RADIUS_M
+    balls: bool = False
 
 
 def touch_solver(
@@ -118,12 +121,16 @@ def patch_width(mesh: TetMesh) -> float:
     return max(PATCH_WIDTH_IN_EDGES * typical_edge(mesh), usual_width(mesh))
 
 
-def load_width(solver: Solver) -> float:
+def load_width(solver: Solver, tip_radius_m: float = USUAL_TIP_RADIUS_M) -> float:
     """The width, m, of the patch of a touch on that object: `patch_width` where it is of one modulus.
 
-    Where its modulus varies, the narrowest that its elements bear: what they add hangs on the load's width.
+    Where its modulus varies, the narrowest that its elements bear, but no narrower than a contact: what they
+    add hangs on the load's width.
     """
-    return patch_width(solver.mesh) if solver.uniform else PATCH_WIDTH_IN_EDGES * typical_edge(solver.mesh)
+    if solver.uniform:
+        return patch_width(solver.mesh)
+    resolved = PATCH_WIDTH_IN_EDGES * typical_edge(solver.mesh)
+    return max(resolved, min(contact_width(tip_radius_m), patch_width(solver.mesh)))
 
 
 def shape_under_one_patch(
@@ -171,15 +178,19 @@ def touch_sites(
         )
     normals = normals / length
     solver = solver or touch_solver(mesh, poisson_ratio)
-    width = patch.width_m or load_width(solver)
+    width = patch.width_m or load_width(solver, patch.tip_radius_m)
     far = own_blocks(solver, points, width, lambda share: progress("touch sites", share))
-    far += sharpening(solver, points, width, patch.tip_radius_m)
-    far -= half_space_compliance(normals, poisson_ratio, width)
     bracing, rims = np.zeros(len(points)), np.zeros(len(points))
+    if patch.balls:
+        by_balls = ball_law(solver, points, normals, width, patch.tip_radius_m)
+        far, bracing = far + by_balls.far, by_balls.bracing
+    else:
+        far += sharpening(solver, points, width, patch.tip_radius_m)
+    far -= half_space_compliance(normals, poisson_ratio, width)
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)
         missed = edge_law(mesh, points, normals, poisson_ratio)
-        far, bracing, rims = far + missed.far, missed.bracing, missed.curvature
+        far, bracing, rims = far + missed.far, bracing + missed.bracing, missed.curvature
     if curvature is None:
         curvature = contact_curvature(mesh, points, normals, patch.tip_radius_m)
     bent = np.asarray(curvature, dtype=float) + rims

@@ -59,7 +59,7 @@ def compliance_key(model: Model, options: ComplianceOptions | None = None) -> st
     balls = tuple(material.inclusions.values())
     error = (options or ComplianceOptions()).error_of(model.mesh)
     return content_key(
-        "surface compliance 8",
+        "surface compliance 9",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,

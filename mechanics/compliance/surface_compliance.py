@@ -22,6 +22,7 @@ from palpate.mechanics.compliance.fine_corners import (
     interpolated,
     is_fine,
     less_half_space,
+    linear,
     normals_of,
 )
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
@@ -50,7 +51,8 @@ class SurfaceCompliance:
     Fine, v corners: own_points, own_normals (v, 3), own_triangles (g, 3) into them, own (v, 3, 3), 1/m:
     displacement of the patch at i for a unit force on itself, and what a nodule close below adds
     (mechanics.compliance.near_field); own_middles (g, 3, 3, 3): the same half way between the corners of each
-    triangle, recovered from those around (mechanics.shape.recovery). own_width_m: (1,).
+    triangle, recovered from those around (mechanics.shape.recovery). own_width_m: (1,). own_bracing: (v,)
+    1/m, by which balls bend the dent's law (near_field.BallLaw).
     poisson_ratio: (1,). Rounding to float32 moves a block by less than 1e-7 of its greatest entry.
     """
 
@@ -68,11 +70,14 @@ class SurfaceCompliance:
     poisson_ratio: np.ndarray
     factor: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 0), dtype=np.float32))
     own_middles: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3, 3)))
+    own_bracing: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         if not len(self.own_middles):
             middles = EdgeMiddles(self.own_points, self.own_triangles)(self.own)
             object.__setattr__(self, "own_middles", middles)
+        if not len(self.own_bracing):
+            object.__setattr__(self, "own_bracing", np.zeros(len(self.own_points)))
         for each in fields(self):
             getattr(self, each.name).setflags(write=False)
 
@@ -95,6 +100,11 @@ class SurfaceCompliance:
         _, triangle, weights = closest(self.own_points, self.own_triangles, points)
         own = interpolated(self.own[self.own_triangles[triangle]], self.own_middles[triangle], weights)
         return less_half_space(own, normals, float(self.poisson_ratio[0]), float(self.own_width_m[0]))
+
+    def bracing_at(self, points: np.ndarray) -> np.ndarray:
+        """(k,) 1/m, `own_bracing` at surface points (k, 3), linear in the nearest fine triangle."""
+        _, triangle, weights = closest(self.own_points, self.own_triangles, points)
+        return linear(self.own_bracing[self.own_triangles[triangle]], weights)
 
     def displacement(self, corner: int, force: np.ndarray) -> np.ndarray:
         """(t, 3) m Pa: motion of all corners for a force (3,) N on the object at one, times the modulus."""
@@ -146,11 +156,13 @@ def surface_compliance(
             mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold, tip_radius_m=tip_radius_m,
             solver=serves,
         )  # fmt: skip
-        own, own_width = fine.own(progress=progress), np.array([fine.width_m])
+        (own, bracing), own_width = fine.own(progress=progress), np.array([fine.width_m])
         own_points, own_normals, own_triangles = fine.points, fine.normals, fine.triangles
     else:
         solved.solve(np.arange(len(solved.own)), progress)
-        own, own_width = np.array(solved.own), np.array(solved.own_width_m)
+        own, own_width, bracing = (
+            np.array(each) for each in (solved.own, solved.own_width_m, solved.own_bracing)
+        )
         own_points, own_normals, own_triangles = (
             np.array(each) for each in (solved.own_points, solved.own_normals, solved.own_triangles)
         )
@@ -167,6 +179,7 @@ def surface_compliance(
         own_triangles=own_triangles,
         own=own,
         own_width_m=own_width,
+        own_bracing=bracing,
         poisson_ratio=np.array([float(poisson_ratio)]),
         **tables,
     )

@@ -3,7 +3,8 @@
 The compliance that the ball's elements hold is divided by Eshelby's factor of a spherical inclusion in an
 incompressible solid, so that a hard ball does not vanish from the sum: share = 5 (m - 1) / (2 m + 3). That is
 first order, which finds a ball; at a fit it is multiplied, place by place, so that it equals the change that
-a renderer of the ball has there (`refine`), whose mesh is fine around it. Fitting again moves the ball.
+a renderer of the ball has there (`refine`), whose mesh is fine around it, and the dent's law is bent as it is
+there. Fitting again moves the ball.
 
 A ball lies inside: its radius is at most its centre's depth below the surface. One that broke through would
 have the tip touch it, and first order knows nothing of that.
@@ -36,7 +37,7 @@ hundredth of it, as strain energy falls with the fourth power of the distance.""
 STARTS = 6
 LEAST_M = 1e-3
 """Of a ball that lies inside: what is smaller is not felt."""
-_SCALE = "inclusion_scale"
+_SCALE, _BENT = "inclusion_scale", "inclusion_bracing"
 _SCALE_LIMITS = (0.2, 8.0)
 FOUND = "diagnosed"
 _FAR = 40.0
@@ -93,34 +94,43 @@ def first_order(values: np.ndarray, places: Places) -> np.ndarray:
 
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     change = first_order(values, scene.places)
-    scale = scene.places.stages.get(_SCALE)
+    scale, bent = (scene.places.stages.get(name) for name in (_SCALE, _BENT))
+    if bent is not None:
+        settings.bracing = settings.bracing + bent * change[:, 0, 0]
     settings.far = settings.far + (change if scale is None else change * scale[:, None, None])
 
 
 def _refine(scene: TouchedScene, values: np.ndarray) -> None:
     """Hold how much the ball changes each place, where a mesh fine around it is solved, over what first order
-    says, (p,)."""
+    says: its compliance (p,), and the bracing (p,)."""
     places, first = scene.places, first_order(values, scene.places)[:, 0, 0]
-    exact = solved_change(ball_of(values, places), places)[places.place]
+    exact, bracing = (each[places.place] for each in solved_change(ball_of(values, places), places))
     known = np.abs(first) > 1e-3 * np.abs(first).max()
-    scale = np.where(known, exact / np.where(known, first, 1.0), 1.0)
-    places.stages[_SCALE] = np.clip(scale, *_SCALE_LIMITS)
+    over = np.where(known, first, 1.0)
+    scale = np.clip(np.where(known, exact / over, 1.0), *_SCALE_LIMITS)
+    places.stages[_SCALE] = scale
+    # no more of one than of the other
+    share = np.divide(scale * first, exact, out=np.zeros_like(exact), where=known & (exact != 0))
+    places.stages[_BENT] = np.where(known, np.clip(share, 0.0, 1.0) * bracing / over, 0.0)
 
 
-def solved_change(ball: Ball, places: Places) -> np.ndarray:
-    """(q,) 1/m, change of each place's normal compliance, unit modulus, under the load that a renderer takes
-    where there are balls."""
+def solved_change(ball: Ball, places: Places) -> tuple[np.ndarray, np.ndarray]:
+    """(q,) 1/m each: change of each place's normal compliance, unit modulus, under the load that a renderer
+    takes where there are balls, and of its bracing."""
     model = places.model
     mesh, nu = model.mesh.quadratic(), model.material.poisson_ratio
     uniform = np.ptp(model.element_ratio) == 0
     solver = touch_solver(mesh, nu, None if uniform else model.element_ratio, balls=(ball,))
     point, normal = places.point[places.first], places.normal[places.first]
     width = patch_width(solver.mesh) if uniform else None
-    patch = LoadPatch(width, model.tool.tip_radius_m)
-    far = touch_sites(mesh, point, normal, nu, solver=solver, curvature=0.0, patch=patch).far
+    patch = LoadPatch(width, model.tool.tip_radius_m, balls=True)
+    sites = touch_sites(mesh, point, normal, nu, solver=solver, curvature=0.0, patch=patch)
+    far, bracing = sites.far, sites.bracing
     if uniform:  # a width that is given leaves edges out
-        far = far + edge_law(mesh, point, normal, nu).far
-    return np.einsum("qi,qij,qj->q", normal, far, normal) - places.far[places.first, 0, 0]
+        missed = edge_law(mesh, point, normal, nu)
+        far, bracing = far + missed.far, bracing + missed.bracing
+    along = np.einsum("qi,qij,qj->q", normal, far, normal)
+    return along - places.far[places.first, 0, 0], bracing - places.bracing[places.first]
 
 
 def ball_of(values: np.ndarray, places: Places) -> Ball:

@@ -15,7 +15,7 @@ from palpate.mechanics.plausible import POISSON_RATIO
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.nu = float(values[0])
     settings.far = settings.far - scene.places.far + far_at_poisson(scene.places, settings.nu)
-    settings.bracing = bracing_at_poisson(scene.places, settings.nu)
+    settings.bracing = settings.bracing - scene.places.bracing + bracing_at_poisson(scene.places, settings.nu)
 
 
 def _apply(model: Model, keys: Keys) -> Model:

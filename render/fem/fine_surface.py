@@ -26,7 +26,8 @@ class FineSurface:
     of contact_curvature, convex positive, and what a rim close by adds (mechanics.contact.edges); only
     where far is known.
 
-    bracing: (v,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges).
+    bracing: (v,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges) and balls
+    bend the dent's law (mechanics.compliance.near_field).
     softness: (v,) of the material under a tip, global modulus over its own. parents: (k, 3) numbers of each
     fine triangle's mesh corners among the compliance's, -1 on the base.
 
@@ -75,6 +76,7 @@ class FineSurface:
         if not np.isfinite(far).all():
             raise MeshError("the compliance is not known all over the surface: solve it anew")
         self.far[new] = far
+        self.bracing[new] += compliance.bracing_at(points)
 
     def far_of(self, compliance: Compliance) -> np.ndarray:
         """(v, 3, 3) 1/m, the far field by another compliance of the same object."""

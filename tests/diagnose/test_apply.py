@@ -11,7 +11,7 @@ import pytest
 
 import palpate.mechanics.compliance.fine_corners as made
 from palpate.diagnosis.apply import improvement, with_effects, with_replayed_modulus
-from palpate.mechanics.compliance.near_field import sharpening, surface_softness
+from palpate.mechanics.compliance.near_field import BallLaw, ball_law, surface_softness
 from palpate.mechanics.compliance.pressed_places import solve_places
 from palpate.mechanics.compliance.sites import SURFACE_EDGE_M, touch_solver
 from palpate.mechanics.compliance.surface_compliance import surface_compliance
@@ -34,7 +34,7 @@ def coarse():
     """Compliances on the block's own mesh: what is asked here needs no finer one."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(made, "SURFACE_EDGE_M", COARSE_M)
-        patch.setattr(made, "sharpening", lambda *arguments: 0.0)
+        patch.setattr(made, "ball_law", lambda solver, points, *rest: BallLaw.none(len(points)))
         patch.setattr(made, "touch_solver", partial(touch_solver, surface_edge_m=COARSE_M))
         yield
 
@@ -217,16 +217,19 @@ def test_a_ball_that_is_fitted_changes_a_place_as_the_rendered_one_does(model):
     places, ball = at_top(model), Ball((0.0, 0.0, 0.024), 0.01, 6.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(made, "SURFACE_EDGE_M", SURFACE_EDGE_M)
-        patch.setattr(made, "sharpening", sharpening)
+        patch.setattr(made, "ball_law", ball_law)
         patch.setattr(made, "touch_solver", touch_solver)
         plain, with_ball = (
             surface_compliance(model.mesh, model.material.poisson_ratio, balls=balls)
             for balls in ((), (ball,))
         )
-    own = [table.own[np.linalg.norm(table.own_points - TOP, axis=1).argmin()] for table in (plain, with_ball)]
+    rows = [np.linalg.norm(table.own_points - TOP, axis=1).argmin() for table in (plain, with_ball)]
+    own = [table.own[row] for table, row in zip((plain, with_ball), rows, strict=True)]
     rendered = float(UP @ (own[1] - own[0]) @ UP)
     values = np.array([*ball.centre_m, ball.radius_m, np.log(ball.modulus_ratio)])
-    assert solved_change(ball, places)[0] == pytest.approx(rendered, rel=0.1)
+    change, bracing = solved_change(ball, places)
+    assert change[0] == pytest.approx(rendered, rel=0.1)
+    assert bracing[0] == pytest.approx(with_ball.own_bracing[rows[1]], rel=0.1) and bracing[0] < -20
     assert abs(first_order(values, places)[0, 0, 0]) < 0.5 * abs(rendered)
 
 

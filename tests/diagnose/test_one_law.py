@@ -17,7 +17,7 @@ import palpate.mechanics.compliance.fine_corners as made
 from palpate.diagnosis.apply import with_effects
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
-from palpate.mechanics.compliance.near_field import surface_softness
+from palpate.mechanics.compliance.near_field import BallLaw, surface_softness
 from palpate.mechanics.compliance.pressed_places import solve_places
 from palpate.mechanics.compliance.sites import touch_solver
 from palpate.mechanics.compliance.stored_compliance import load_or_condense
@@ -82,7 +82,7 @@ def compliance(model):
     """Of the block's own mesh: only its form is used."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(made, "SURFACE_EDGE_M", COARSE_M)
-        patch.setattr(made, "sharpening", lambda *arguments: 0.0)
+        patch.setattr(made, "ball_law", lambda solver, points, *rest: BallLaw.none(len(points)))
         patch.setattr(made, "touch_solver", partial(touch_solver, surface_edge_m=COARSE_M))
         return load_or_condense(model)
 

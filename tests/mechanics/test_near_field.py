@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from palpate.mechanics.compliance.near_field import contact_width, sharpening
-from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from palpate.mechanics.compliance.near_field import ball_law, contact_width, sharpening
+from palpate.mechanics.compliance.sites import LoadPatch, load_width, patch_width, touch_sites, touch_solver
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.model.material import Ball, balls_ratio, inclusion_ratio, mixed_ratio
 from palpate.mechanics.shape.refine import refined_around, refined_near_surface
@@ -48,6 +51,29 @@ def test_a_narrower_contact_feels_more_of_a_nodule(mesh):
     blunt = sharpening(solver, TOP[:1], width, tip_radius_m=0.008)[0]
     assert near[2, 2] < blunt[2, 2] < 0
     assert (sharpening(solver, TOP, contact_width(0.005)) == 0).all()
+
+
+def test_a_load_is_never_narrower_than_a_contact(box):
+    """On elements of 2.5 mm a nodule was felt a third too much, under a load of half the contact's width."""
+    mesh = box((30, 30, 4), (0.075, 0.075, 0.01)).quadratic()
+    solver = SimpleNamespace(mesh=mesh, uniform=False)  # nothing is solved
+    assert load_width(solver, 0.005) == pytest.approx(contact_width(0.005))
+    assert load_width(solver, 0.001) < contact_width(0.005), "what the elements bear"
+    assert load_width(solver, 1.0) == pytest.approx(patch_width(mesh))
+
+
+def test_a_bent_dent_has_the_forces_of_both_depths(mesh):
+    """The contact widens: over a stiff ball deep touches gain less than a far field alone makes them gain."""
+    solver = Solver(mesh, NU, stiff(mesh))
+    law = ball_law(solver, TOP, UP, patch_width(mesh))
+    assert law.bracing[1] == 0 and (law.far[1] == 0).all(), "too far to matter"
+    narrow = sharpening(solver, TOP, patch_width(mesh))[0, 2, 2]
+    assert law.far[0, 2, 2] < narrow < 0 and law.bracing[0] < 0
+    soft = ball_law(Solver(mesh, NU, balls_ratio(mesh, [replace(BALL, modulus_ratio=0.3)])), TOP, UP, 0.004)
+    assert soft.far[0, 2, 2] > 0 and soft.bracing[0] > 0
+    twice = ball_law(Solver(mesh, NU, stiff(mesh, 2.0)), TOP, UP, patch_width(mesh))
+    assert twice.far[0, 2, 2] == pytest.approx(law.far[0, 2, 2] / 2, rel=1e-4)
+    assert twice.bracing[0] == pytest.approx(law.bracing[0], rel=1e-3), "it has no unit of force"
 
 
 def test_a_stiffer_object_as_a_whole_scales_it(mesh):

@@ -7,6 +7,7 @@ sphere's profile; of all radii the true contact is the one with the greatest for
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +15,8 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri
 
-from palpate.mechanics.compliance.sites import touch_sites, touch_solver
-from palpate.mechanics.contact.touch import touch_force
+from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
+from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.model.material import Ball
 
@@ -112,26 +113,32 @@ class AxisPress:
         return float(max(forces))
 
 
-def press_on_axis(solver: Solver, height_m: float, depth_m: float) -> float:
-    """N, for unit modulus: the force of a press at the middle of the top."""
+def presses_on_axis(solver: Solver, height_m: float, depths_m: np.ndarray) -> np.ndarray:
+    """(k,) N, for unit modulus: force at depths (k,) m, ascending, of a press at the middle of the top."""
     point = np.array([[0.0, 0.0, height_m]])
-    far = touch_sites(solver.mesh, point, UP[None], NU, solver=solver, curvature=0.0).far[0]
-    path = -np.linspace(0, depth_m, 80)[:, None] * UP
-    force = touch_force(path, UP, far, young_modulus_pa=1.0, poisson_ratio=NU, tip_radius_m=TIP, law="linear")
-    return float(force[-1, 2])
+    sites = touch_sites(
+        solver.mesh, point, UP[None], NU, solver=solver, curvature=0.0, patch=LoadPatch(balls=True)
+    )
+    path = -np.unique(np.concatenate([np.linspace(0, depths_m[-1], 80), depths_m]))[:, None] * UP
+    force = forces_at(
+        sites, path, np.array([0, len(path)]), young_modulus_pa=1.0, tip_radius_m=TIP, law="linear"
+    )
+    return np.interp(depths_m, -path[:, 2], force[:, 2])
 
 
-def felt(press: AxisPress, mesh_size_m: float = 0.01) -> dict[str, float]:
-    """Contrast (the force over that without the nodule, less 1) on the paper's cylinder, linear dent law,
-    beside the reference's; and the force without the nodule over the reference's."""
-    mesh = sample_mesh("cylinder", mesh_size_m)
-    plain = press_on_axis(touch_solver(mesh, NU), press.height_m, press.depth_m)
-    known_plain = replace(press, modulus_ratio=1.0).force()
+def felt(press: AxisPress, depths_m: Sequence[float], mesh_size_m: float = 0.01) -> dict[str, np.ndarray]:
+    """At depths (k,) m, ascending: contrast (the force over that without the nodule, less 1) on the paper's
+    cylinder, linear dent law, beside the reference's; and the force without the nodule over the
+    reference's."""
+    mesh, depths = sample_mesh("cylinder", mesh_size_m), np.array(depths_m)
+    plain = presses_on_axis(touch_solver(mesh, NU), press.height_m, depths)
     place = (0.0, 0.0, press.height_m - press.depth_of_centre_m)
     ball = Ball(place, press.nodule_radius_m, press.modulus_ratio)
-    stiff = press_on_axis(touch_solver(mesh, NU, balls=[ball]), press.height_m, press.depth_m)
+    stiff = presses_on_axis(touch_solver(mesh, NU, balls=[ball]), press.height_m, depths)
+    known = np.array([[replace(press, depth_m=depth, modulus_ratio=ratio).force()
+                       for ratio in (1.0, press.modulus_ratio)] for depth in depths])  # fmt: skip
     return {
         "contrast": stiff / plain - 1,
-        "reference": press.force() / known_plain - 1,
-        "plain_force_over_reference": plain / known_plain,
+        "reference": known[:, 1] / known[:, 0] - 1,
+        "plain_force_over_reference": plain / known[:, 0],
     }
