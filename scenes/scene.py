@@ -79,8 +79,8 @@ SCHEMA: Schema = {
 """What a scene's file may hold."""
 
 
-FIND_M = 0.008
-"""How deep one presses for what is hidden: the deeper, the more it shows."""
+FIND_M = 0.004
+"""How deep one presses for what is hidden: the map of the nodule shows it best there."""
 
 
 @dataclass(frozen=True)

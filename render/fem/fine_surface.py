@@ -49,6 +49,7 @@ class FineSurface:
         self._rims = np.zeros(v)
         missed = edge_law(mesh, points, normals, nu)
         self._added[touched], self.bracing[touched] = missed.far, missed.bracing
+        self._over_base = np.array(self.bracing)
         self._rims[touched] = missed.curvature
         self.softness[touched] = surface_softness(mesh, model.surface_ratio, points, tip)
         width = float(compliance.own_width_m[0])
@@ -78,12 +79,12 @@ class FineSurface:
         self.far[new] = far
         self.bracing[new] += compliance.bracing_at(points)
 
-    def far_of(self, compliance: Compliance) -> np.ndarray:
-        """(v, 3, 3) 1/m, the far field by another compliance of the same object."""
-        far = np.zeros_like(self.far)
-        at = self._touched
+    def field_of(self, compliance: Compliance) -> tuple[np.ndarray, np.ndarray]:
+        """(far (v, 3, 3), bracing (v,)), 1/m, by another compliance of the same object."""
+        far, bracing, at = np.zeros_like(self.far), np.array(self._over_base), self._touched
         far[at] = compliance.far_at(self._vertices[at], self._normals[at]) + self._added[at]
-        return far
+        bracing[at] += compliance.bracing_at(self._vertices[at])
+        return far, bracing
 
 
 def keep_surface(model: Model, options: RenderOptions) -> None:

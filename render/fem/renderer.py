@@ -117,7 +117,8 @@ class FemRenderer(Renderer):
             blocks, factor = np.array(self.compliance.blocks), np.array(self.compliance.factor)
             self.parameters = self.parameters._replace(blocks=blocks, factor=factor)
             if coarse:
-                self.parameters = self.parameters._replace(far=self.far_of(self.compliance))
+                far, bracing = self.field_of(self.compliance)
+                self.parameters = self.parameters._replace(far=far, bracing=bracing)
             self.far_at(slice(None))
         return self
 
@@ -126,9 +127,9 @@ class FemRenderer(Renderer):
         """Whether what it renders is what solved places tell of the others."""
         return isinstance(self.compliance, CoarseCompliance)
 
-    def far_of(self, compliance: Compliance) -> np.ndarray:
-        """(v, 3, 3) 1/m, the far field by another compliance of the same object, for `with_field`."""
-        return self._fine.far_of(compliance)
+    def field_of(self, compliance: Compliance) -> tuple[np.ndarray, np.ndarray]:
+        """(far (v, 3, 3), bracing (v,)), 1/m, by another compliance of the same object, for `with_field`."""
+        return self._fine.field_of(compliance)
 
     @property
     def whole_compliance(self) -> SurfaceCompliance:
@@ -151,11 +152,14 @@ class FemRenderer(Renderer):
         changed.parameters = changed.parameters._replace(table=table)
         return changed
 
-    def with_field(self, far: np.ndarray, blocks: np.ndarray | None = None) -> FemRenderer:
-        """The same renderer with another far field (v, 3, 3), mutual table (t, t, 3, 3), 1/m, unit modulus.
+    def with_field(
+        self, far: np.ndarray, blocks: np.ndarray | None = None, bracing: np.ndarray | None = None
+    ) -> FemRenderer:
+        """The same renderer with another far field (v, 3, 3), mutual table (t, t, 3, 3), bracing (v,), 1/m,
+        unit modulus.
 
         For an object that changes inside, or is known better, while it is touched: a state that goes on comes
-        to it within held_tips.BLEND_S. blocks: None keeps the table.
+        to it within held_tips.BLEND_S. None keeps what is there.
         """
         if not self.coarse:
             self.condensed()
@@ -171,6 +175,8 @@ class FemRenderer(Renderer):
             series_before=given.series_compliance,
             edition=given.edition + 1,
         )
+        if bracing is not None:
+            changed.parameters = changed.parameters._replace(bracing=np.array(bracing, order="C"))
         if blocks is not None:
             table = np.array(blocks, dtype=np.float32, order="C")
             changed.parameters = changed.parameters._replace(blocks=table)

@@ -200,7 +200,8 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
         done = int(solved.is_solved.sum())
         if done >= _GROWTH * told or done == len(solved.own):
             told, coarse = done, CoarseCompliance(solved)
-            change = FieldChange.written(folder / f"field-{done}.npz", renderer.far_of(coarse))
+            far, bracing = renderer.field_of(coarse)
+            change = FieldChange.written(folder / f"field-{done}.npz", far, bracing=bracing)
             tell({**at(coarse), FIELD: str(change.path)})
         else:
             tell({"solved": done / len(solved.own)})

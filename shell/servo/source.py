@@ -61,16 +61,21 @@ class RendererChange(Protocol):
 
 @dataclass(frozen=True)
 class FieldChange:
-    """The far field (v, 3, 3) of an object that changed, or is known better, and the table between its places
-    where that changed, of no size where not: in a file, for renderers in any process."""
+    """The far field (v, 3, 3) of an object that changed, or is known better; the bracing (v,) and the table
+    between its places where those changed, of no size where not: in a file, for renderers in any process."""
 
     path: Path
 
     @classmethod
-    def written(cls, path: Path, far: np.ndarray, blocks: np.ndarray | None = None) -> FieldChange:
-        """To a file; blocks: None where the table between places stays."""
+    def written(
+        cls, path: Path, far: np.ndarray, blocks: np.ndarray | None = None, bracing: np.ndarray | None = None
+    ) -> FieldChange:
+        """To a file; None where the table between places, or the bracing, stays."""
         with open(path, "wb") as file:
-            np.savez(file, far=far, blocks=np.zeros((0, 0, 3, 3)) if blocks is None else blocks)
+            np.savez(
+                file, far=far, blocks=np.zeros((0, 0, 3, 3)) if blocks is None else blocks,
+                bracing=np.zeros(0) if bracing is None else bracing,
+            )  # fmt: skip
         return cls(path)
 
     def changed(self, renderer: Any) -> Any:
@@ -82,7 +87,8 @@ class FieldChange:
         change."""
         with np.load(self.path) as arrays:
             table = len(arrays["blocks"]) and len(renderer.parameters.blocks)
-            return renderer.with_field(arrays["far"], arrays["blocks"] if table else None)
+            bracing = arrays["bracing"] if len(arrays["bracing"]) else None
+            return renderer.with_field(arrays["far"], arrays["blocks"] if table else None, bracing)
 
 
 class ModelFolder:

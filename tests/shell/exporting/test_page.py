@@ -23,7 +23,7 @@ from palpate.mechanics.model.model import Model
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.press import Stroke, press, read_curve
 from palpate.render.scene import in_the_air
-from palpate.scenes.scene import load_scene
+from palpate.scenes.scene import FIND_M, load_scene
 
 from ..show import browser
 
@@ -488,5 +488,5 @@ def test_a_page_of_a_hidden_nodule_names_the_task(renderer, monkeypatch, tmp_pat
     scene = bound["scene"]
     page = page_of(renderer, title=scene.title, task=scene.task)
     head = page.partition("<h1>")[2].partition("<canvas")[0]
-    assert "nodule" in head.partition("</h1>")[0] and "8 mm" in head
+    assert "nodule" in head.partition("</h1>")[0] and f"{1e3 * FIND_M:g} mm" in head
     assert not load_scene("demo").task
