@@ -60,7 +60,7 @@ def _watched(driven: Driven, lasts_s: float, wanted: int) -> tuple[np.ndarray, l
     began = driven.frame().time_s
     times, pictures = [], []
     for due in np.linspace(0.0, lasts_s, wanted):
-        frame = driven.until(lambda frame, due=due: frame.time_s >= began + due)
+        frame = driven.wait(max(0.0, began + due - driven.frame().time_s))
         pictures.append(_felt(driven))
         times.append(frame.time_s - began)
         driven.button(True)
