@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from palpate.mechanics.errors import MeshError
+from palpate.mechanics.kernels import kernel
 from palpate.mechanics.shape.nearest import triangle_areas
 from palpate.mechanics.shape.tetmesh import EDGES, TetMesh
 
@@ -93,7 +94,19 @@ def stiffness(
     *,
     local_bulk: float = LOCAL_BULK,
 ) -> sp.csr_matrix:
-    """Stiffness for unit Young's modulus: symmetric (3n, 3n), m (newtons a metre a pascal), nothing fixed.
+    """`stiffness_blocks` as (3n, 3n) numbers."""
+    return stiffness_blocks(mesh, poisson_ratio, modulus_ratio, local_bulk=local_bulk).tocsr()
+
+
+def stiffness_blocks(
+    mesh: TetMesh,
+    poisson_ratio: float,
+    modulus_ratio: np.ndarray | None = None,
+    *,
+    local_bulk: float = LOCAL_BULK,
+) -> sp.bsr_matrix:
+    """Stiffness for unit Young's modulus: symmetric (3n, 3n) in blocks of 3, m (newtons a metre a pascal),
+    nothing fixed.
 
     modulus_ratio: (m,) modulus of each tetrahedron over the global one; None: homogeneous. local_bulk: see
     `element_stiffness`.
@@ -104,24 +117,38 @@ def stiffness(
     if ratio.shape != (m,) or not (ratio > 0).all():
         raise MeshError(f"modulus_ratio must hold {m} positive values, one a tetrahedron")
     tets = mesh.tetrahedra
-    keys = (tets[:, :, None] * n + tets[:, None, :]).ravel()
-    unique, place = np.unique(keys, return_inverse=True)
-    place = place.reshape(m, -1)
-    blocks = np.zeros((len(unique), 3, 3))
+    corners_of = np.arange(0, tets.size + 1, tets.shape[1])
+    held = sp.csr_matrix((np.ones(tets.size), tets.ravel(), corners_of), shape=(m, n))
+    pattern = (held.T @ held).tocsr()  # nodes that share an element
+    pattern.sort_indices()
+    rows, columns = pattern.indptr, pattern.indices
+    blocks = np.zeros((len(columns), 3, 3))
     for start in range(0, m, _CHUNK):
         part = slice(start, start + _CHUNK)
         corners = mesh.points[tets[part, :4]]
         element = element_stiffness(corners, mesh.order, poisson_ratio, local_bulk=local_bulk)
         element *= ratio[part, None, None, None, None]
-        index = place[part].ravel()
-        low = int(index.min())
-        for a in range(3):
-            for b in range(3):
-                sums = np.bincount(index - low, weights=element[:, :, a, :, b].ravel())
-                blocks[low : low + len(sums), a, b] += sums
-    rows, columns = np.divmod(unique, n)
-    indptr = np.searchsorted(rows, np.arange(n + 1))
-    return sp.bsr_matrix((blocks, columns, indptr), shape=(3 * n, 3 * n)).tocsr()
+        _add(blocks, rows, columns, tets[part], element)
+    return sp.bsr_matrix((blocks, columns, rows), shape=(3 * n, 3 * n))
+
+
+@kernel
+def _add(blocks, rows, columns, tets, elements):
+    """Add element matrices (m, k, 3, k, 3) of tetrahedra (m, k) to the blocks of a pattern, columns sorted
+    in each row."""
+    for e in range(tets.shape[0]):
+        for i in range(tets.shape[1]):
+            for j in range(tets.shape[1]):
+                low, high = rows[tets[e, i]], rows[tets[e, i] + 1]
+                while high - low > 1:
+                    middle = (low + high) // 2
+                    if columns[middle] <= tets[e, j]:
+                        low = middle
+                    else:
+                        high = middle
+                for a in range(3):
+                    for b in range(3):
+                        blocks[low, a, b] += elements[e, i, a, j, b]
 
 
 def triangle_mass(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

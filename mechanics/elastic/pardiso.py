@@ -73,25 +73,12 @@ def _pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-class Pardiso:
-    """A factorisation of a symmetric positive definite matrix; frees MKL's memory when it dies.
+class _Handle:
+    """One handle of the library for an upper triangle (n, n), CSR, sorted; frees MKL's memory when it
+    dies."""
 
-    matrix: (n, n) sparse, both triangles stored. With `schur` (indices of k unknowns) the factorisation
-    stops there and writes the dense (k, k) Schur complement on those unknowns, in ascending order of index,
-    to `out`, C-contiguous and zero before. Raises ArithmeticError where the matrix is not positive definite.
-    """
-
-    def __init__(
-        self,
-        matrix: sp.csr_matrix,
-        schur: np.ndarray | None = None,
-        *,
-        out: np.ndarray | None = None,
-        definite: bool = True,
-    ) -> None:
-        upper = sp.triu(matrix, format="csr")
-        upper.sort_indices()
-        self._kind = _DEFINITE if definite else _INDEFINITE
+    def __init__(self, upper: sp.csr_matrix, kind: int = _DEFINITE) -> None:
+        self._kind = kind
         self.size = upper.shape[0]
         self._values = np.ascontiguousarray(upper.data, dtype=np.float64)
         self._rows = upper.indptr.astype(np.int32)
@@ -103,25 +90,6 @@ class Pardiso:
         self._iparm[17] = -1  # tell the number of nonzeros in the factor
         self._iparm[34] = 1  # zero-based indices
         self._perm = np.zeros(self.size, dtype=np.int32)
-        if schur is not None:
-            self._perm[schur] = 1
-            self._iparm[35] = 1  # only the Schur complement, no factors to solve with
-        self._call(12, np.zeros(1), np.zeros(1) if out is None else out, 0)
-        self.factor_nonzeros = int(self._iparm[17])
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solutions for right-hand sides (n,) or (n, r)."""
-        right = np.asfortranarray(right, dtype=np.float64)
-        solution = np.empty_like(right, order="F")
-        self._call(33, right, solution, 1 if right.ndim == 1 else right.shape[1])
-        return solution
-
-    def half_solve(self, right: np.ndarray) -> np.ndarray:
-        """L^-1 P b for right-hand sides (n, r), A = P' L L' P: b' A^-1 c is the product of two halves."""
-        right = np.asfortranarray(right, dtype=np.float64)
-        half = np.empty_like(right, order="F")
-        self._call(331, right, half, right.shape[1])
-        return half
 
     def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int) -> None:
         error = ctypes.c_int32(0)
@@ -155,6 +123,71 @@ class Pardiso:
     def __del__(self) -> None:
         if not sys.is_finalizing() and getattr(self, "_handle", None) is not None:
             self.free()
+
+
+class Pardiso(_Handle):
+    """A factorisation of a symmetric positive definite matrix.
+
+    matrix: (n, n) sparse, both triangles stored. group: unknowns that follow one another and meet the same
+    others, such as a node's three: their graph is a ninth as large, and ordered in a third of the time. With
+    `schur` (indices of k unknowns) the factorisation stops there and writes the dense (k, k) Schur complement
+    on those unknowns, in ascending order of index, to `out`, C-contiguous and zero before. Raises
+    ArithmeticError where the matrix is not positive definite.
+    """
+
+    def __init__(
+        self,
+        matrix: sp.csr_matrix,
+        schur: np.ndarray | None = None,
+        *,
+        out: np.ndarray | None = None,
+        definite: bool = True,
+        group: int = 1,
+    ) -> None:
+        upper = sp.triu(matrix, format="csr")
+        upper.sort_indices()
+        super().__init__(upper, _DEFINITE if definite else _INDEFINITE)
+        if schur is not None:
+            self._perm[schur] = 1
+            self._iparm[35] = 1  # only the Schur complement, no factors to solve with
+        elif group > 1:
+            self._perm = _dissected(upper, group)
+            self._iparm[4] = 1  # in that order
+        self._call(12, np.zeros(1), np.zeros(1) if out is None else out, 0)
+        self.factor_nonzeros = int(self._iparm[17])
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solutions for right-hand sides (n,) or (n, r)."""
+        right = np.asfortranarray(right, dtype=np.float64)
+        solution = np.empty_like(right, order="F")
+        self._call(33, right, solution, 1 if right.ndim == 1 else right.shape[1])
+        return solution
+
+    def half_solve(self, right: np.ndarray) -> np.ndarray:
+        """L^-1 P b for right-hand sides (n, r), A = P' L L' P: b' A^-1 c is the product of two halves."""
+        right = np.asfortranarray(right, dtype=np.float64)
+        half = np.empty_like(right, order="F")
+        self._call(331, right, half, right.shape[1])
+        return half
+
+
+class _Order(_Handle):
+    """The order of elimination that the library finds for a graph."""
+
+    def found(self) -> np.ndarray:
+        """(n,) int32, each unknown's place."""
+        self._iparm[4] = 2  # write it
+        self._call(11, np.zeros(1), np.zeros(1), 0)
+        return self._perm
+
+
+def _dissected(upper: sp.csr_matrix, group: int) -> np.ndarray:
+    """(n,) int32, the order of elimination by nested dissection of the graph of groups."""
+    first = upper[::group]
+    size = upper.shape[0] // group
+    graph = sp.csr_matrix((np.ones(first.nnz), first.indices // group, first.indptr), shape=(size, size))
+    graph.sum_duplicates()
+    return (group * _Order(graph).found()[:, None] + np.arange(group, dtype=np.int32)).ravel()
 
 
 class PartialFactor:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from palpate.mechanics.elastic import pardiso
-from palpate.mechanics.elastic.elasticity import LOCAL_BULK, stiffness
+from palpate.mechanics.elastic.elasticity import LOCAL_BULK, stiffness_blocks
 from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.errors import MeshError, OptionError
 from palpate.mechanics.shape.tetmesh import TetMesh
@@ -42,14 +43,14 @@ class Solver:
         if self.backend not in BACKENDS:
             raise OptionError(f"backend is '{backend}'; allowed are {', '.join(BACKENDS)}")
         self.free = free_dofs(mesh, hold)
-        full = stiffness(mesh, poisson_ratio, modulus_ratio, local_bulk=local_bulk)
+        full = stiffness_blocks(mesh, poisson_ratio, modulus_ratio, local_bulk=local_bulk)
         springs = None if hold is None else hold.stiffness(mesh)
         if springs is not None:
-            full = (full + springs).tocsr()
-        self.matrix = full[self.free][:, self.free].tocsr()
+            full = full + springs.tobsr((3, 3))
+        self.matrix = _of_nodes(full, self.free[::3] // 3)
         try:
             if self.backend == "pardiso":
-                self._factor = pardiso.Pardiso(self.matrix)
+                self._factor = pardiso.Pardiso(self.matrix, group=3)
             else:
                 self._factor = spla.splu(
                     self.matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
@@ -97,6 +98,15 @@ class Solver:
         """Solutions (f, r) for right-hand sides (f, r) over the free degrees of freedom (`.free`,
         ascending)."""
         return self._factor.solve(np.asfortranarray(right, dtype=float))
+
+
+def _of_nodes(matrix: sp.bsr_matrix, nodes: np.ndarray) -> sp.csr_matrix:
+    """(3k, 3k), the rows and columns of nodes (k,)."""
+    n = matrix.shape[0] // 3
+    place = np.arange(len(matrix.indices))
+    kept = sp.csr_matrix((place, matrix.indices, matrix.indptr), shape=(n, n))[nodes][:, nodes]
+    size = 3 * len(nodes)
+    return sp.bsr_matrix((matrix.data[kept.data], kept.indices, kept.indptr), shape=(size, size)).tocsr()
 
 
 def free_dofs(mesh: TetMesh, hold: BaseHold | None = None) -> np.ndarray:

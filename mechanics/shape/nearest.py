@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import numpy as np
 
 
@@ -43,10 +45,20 @@ def closest(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """For points (k, 3): closest points (k, 3), their triangle (k,), and barycentric weights (k, 3) in it."""
     import pyvista
+    from vtkmodules.vtkCommonCore import reference
+    from vtkmodules.vtkCommonDataModel import vtkGenericCell, vtkStaticCellLocator
 
     shell = pyvista.PolyData.from_regular_faces(np.asarray(vertices, dtype=float), np.asarray(triangles))
-    index, found = shell.find_closest_cell(np.asarray(points, dtype=float), return_closest_point=True)
-    index, found = np.atleast_1d(index).astype(np.int64), np.reshape(found, (-1, 3))  # of no points too
+    locator = vtkStaticCellLocator()
+    locator.SetDataSet(shell)
+    locator.BuildLocator()
+    # the library's own loop makes anew for every point what serves for all
+    cell, place = vtkGenericCell(), [0.0] * 3
+    triangle, part, squared = (cast(Any, reference(zero)) for zero in (0, 0, 0.0))
+    index, found = np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
+    for k, point in enumerate(np.asarray(points, dtype=float).tolist()):
+        locator.FindClosestPoint(point, place, cell, triangle, part, squared)
+        index[k], found[k] = triangle.get(), place
     a, b, c = (np.asarray(vertices)[np.asarray(triangles)[index, k]] for k in range(3))
     u, v, w = b - a, c - a, found - a
     uu, vv, uv = (np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (v, v), (u, v)))

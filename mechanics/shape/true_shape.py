@@ -176,8 +176,8 @@ class TrueShape:
         area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
         # pieces of one cell that look alike count as one: a fine file takes no longer
         cell = np.hstack([np.floor(places / _SAMPLE_M), np.rint(3 * facing)]).astype(np.int64)
-        _, cell = np.unique(cell, axis=0, return_inverse=True)
-        cell = cell.ravel()
+        cell -= cell.min(axis=0)
+        _, cell = np.unique(np.ravel_multi_index(tuple(cell.T), cell.max(axis=0) + 1), return_inverse=True)
         total = np.bincount(cell, area)
 
         def mean(values: np.ndarray) -> np.ndarray:

@@ -31,31 +31,50 @@ class Bvh(NamedTuple):
 def build_bvh(corners: np.ndarray) -> Bvh:
     """Median splits along the longest side; corners (k, 3, 3) m. The same triangles give the same tree."""
     low, high = corners.min(axis=1), corners.max(axis=1)
-    centre = (low + high) / 2
-    order = np.arange(len(corners))
-    corner_low, corner_high, parts = [], [], []
-    children: list[list[int]] = []
-    # no recursion: a function that knows itself is a cycle, and the servo collects no garbage
-    waiting = [(0, len(corners), -1, 0)]
-    while waiting:
-        begin, end, parent, side = waiting.pop()
-        if parent >= 0:
-            children[parent][side] = len(children)
-        members = order[begin:end]
-        corner_low.append(low[members].min(axis=0))
-        corner_high.append(high[members].max(axis=0))
-        is_leaf = end - begin <= _LEAF
-        parts.append((begin, end - begin if is_leaf else 0))
-        if not is_leaf:
-            spread = centre[members]
-            axis = int((spread.max(axis=0) - spread.min(axis=0)).argmax())
-            order[begin:end] = members[np.argsort(spread[:, axis], kind="stable")]
-            middle = (begin + end) // 2
-            waiting += [(middle, end, len(children), 1), (begin, middle, len(children), 0)]
-        children.append([-1, -1])
-    left, right = np.array(children, dtype=np.int64).T.copy()
-    start, held = np.array(parts, dtype=np.int64).T.copy()
-    return Bvh(np.array(corner_low), np.array(corner_high), left, right, start, held, order)
+    order, levels = _levels((low + high) / 2)
+    # boxes are numbered parents first, then all of the left child's, then the right one's
+    counts = [np.ones(len(begin), dtype=np.int64) for begin, _ in levels]
+    splits = [end - begin > _LEAF for begin, end in levels]
+    for depth in range(len(levels) - 2, -1, -1):
+        counts[depth][splits[depth]] += counts[depth + 1].reshape(-1, 2).sum(axis=1)
+    total = int(counts[0][0])
+    left, right, start, held = np.full((4, total), -1)
+    box_low, box_high = np.empty((2, total, 3))
+    number = np.zeros(1, dtype=np.int64)
+    for (begin, end), split, below in zip(levels, splits, [*counts[1:], np.zeros(0, int)], strict=True):
+        start[number], held[number] = begin, np.where(split, 0, end - begin)
+        parts = np.column_stack([begin, end]).ravel()[:-1]  # what lies between two boxes is dropped again
+        box_low[number] = np.minimum.reduceat(low[order[: end[-1]]], parts)[::2]
+        box_high[number] = np.maximum.reduceat(high[order[: end[-1]]], parts)[::2]
+        parent = number[split]
+        left[parent], right[parent] = parent + 1, parent + 1 + below[::2]
+        number = np.column_stack([left[parent], right[parent]]).ravel()
+    return Bvh(box_low, box_high, left, right, start, held, order)
+
+
+def _levels(centre: np.ndarray) -> tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]]:
+    """Order (k,) of triangles of these middles (k, 3), and of each level of the tree the boxes' parts of it:
+    begin and end, ascending; the next level has the two halves of each that is no leaf."""
+    order = np.arange(len(centre))
+    begin, end = np.array([0]), np.array([len(centre)])
+    levels = []
+    while len(begin):
+        levels.append((begin, end))
+        split = end - begin > _LEAF
+        begin, end = begin[split], end[split]
+        size = end - begin
+        first = np.cumsum(size) - size
+        box = np.repeat(np.arange(len(size)), size)
+        place = np.arange(len(box)) + (begin - first)[box]
+        members = order[place]
+        if len(box):
+            inside = centre[members]
+            spread = np.maximum.reduceat(inside, first) - np.minimum.reduceat(inside, first)
+            along = inside[np.arange(len(box)), spread.argmax(axis=1)[box]]
+            order[place] = members[np.lexsort((along, box))]
+        middle = (begin + end) // 2
+        begin, end = (np.column_stack(pair).ravel() for pair in ((begin, middle), (middle, end)))
+    return order, levels
 
 
 @kernel

@@ -8,7 +8,8 @@ import scipy.sparse.linalg as spla
 
 from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.elastic.elasticity import element_stiffness, lame_parameters, stiffness, strain
-from palpate.mechanics.elastic.pardiso import available
+from palpate.mechanics.elastic.held_base import BaseHold
+from palpate.mechanics.elastic.pardiso import Pardiso, available
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import MeshError
 
@@ -172,3 +173,26 @@ def test_a_bonded_block_does_not_lock(box):
     found, _ = compliance(box((8, 8, 3), (0.1, 0.1, 0.03)).quadratic(), 0.499)
     reference = mixed_compliance(box((12, 12, 4), (0.1, 0.1, 0.03)).quadratic(), 0.499)
     assert found == pytest.approx(reference, rel=0.01)
+
+
+@pytest.mark.skipif(not available(), reason="MKL Pardiso is not there")
+def test_nodes_eliminated_together_move_as_unknowns_one_by_one(box):
+    matrix = Solver(box((5, 4, 3), (0.1, 0.07, 0.05)).quadratic(), 0.49).matrix
+    loads = np.random.default_rng(2).normal(size=(matrix.shape[0], 4))
+    together, apart = Pardiso(matrix, group=3), Pardiso(matrix)
+    assert np.allclose(together.solve(loads), apart.solve(loads), rtol=1e-9, atol=0)
+    one, other = together.half_solve(loads), apart.half_solve(loads)
+    assert np.allclose(one.T @ one, other.T @ other, rtol=1e-10)
+
+
+def test_a_solver_has_the_stiffness_of_what_is_free(box):
+    """Blocks of nodes are chosen, not numbers; springs under the base are added to them."""
+    mesh = box((3, 2, 2), (0.1, 0.07, 0.05)).quadratic()
+    for hold in (None, BaseHold(np.array([0.0, 0.0, 1.0]), springs=(30.0, 20.0))):
+        solver = Solver(mesh, 0.45, hold=hold)
+        whole = stiffness(mesh, 0.45).toarray()
+        if hold is not None:
+            whole += hold.stiffness(mesh).toarray()
+        expected = whole[np.ix_(solver.free, solver.free)]
+        assert np.abs(solver.matrix.toarray() - expected).max() < 1e-14 * np.abs(expected).max()
+        assert np.abs(expected - expected.T).max() < 1e-14 * np.abs(expected).max()
