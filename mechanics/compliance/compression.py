@@ -93,19 +93,15 @@ def compress(
 
 
 def own_compliance(solver: Solver, average: sp.csr_matrix) -> np.ndarray:
-    """(k, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; weights (k, n).
-
-    A lone patch is solved twice: among others its last bit would be another.
-    """
-    k = average.shape[0]
-    weights = (sp.vstack([average, average]) if k == 1 else average).tocoo()
+    """(k, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; weights (k, n)."""
+    weights = average.tocoo()
     row = np.full(3 * len(solver.mesh.points), -1)
     row[solver.free] = np.arange(len(solver.free))
     loads = np.zeros((len(solver.free), 3 * weights.shape[0]), order="F")
     for axis in range(3):
         at = row[3 * weights.col + axis]
         loads[at[at >= 0], 3 * weights.row[at >= 0] + axis] = weights.data[at >= 0]
-    return solver.quadratic_forms(loads.T.reshape(-1, 3, len(loads)).transpose(2, 0, 1))[:k]
+    return solver.quadratic_forms(loads.T.reshape(-1, 3, len(loads)).transpose(2, 0, 1))
 
 
 def own_blocks(

@@ -59,7 +59,7 @@ def compliance_key(model: Model, options: ComplianceOptions | None = None) -> st
     balls = tuple(material.inclusions.values())
     error = (options or ComplianceOptions()).error_of(model.mesh)
     return content_key(
-        "surface compliance 9",
+        "surface compliance 8",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,
@@ -69,7 +69,7 @@ def compliance_key(model: Model, options: ComplianceOptions | None = None) -> st
         model.ratio_without_balls,
         *(() if hold is None else dataclasses.astuple(hold)),
         *(() if error is None else ("low-rank", error)),
-        *([model.tool.tip_radius_m] if balls else []),
+        *([model.tool.tip_radius_m, "felt by depth"] if balls else []),
         *(value for ball in balls for value in dataclasses.astuple(ball)),
     )
 
@@ -167,7 +167,7 @@ def kept_places(model: Model) -> OnDemandCompliance | None:
 
 
 def _places_of(model: Model) -> tuple[str, Path | None]:
-    key = content_key("solved places 1", compliance_key(model, ComplianceOptions("dense")))
+    key = content_key("solved places 2", compliance_key(model, ComplianceOptions("dense")))
     return key, None if model.path is None else model.path / f"places-{key[:16]}.bin"
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 _DEFINITE, _INDEFINITE = 2, -2  # the library's names of real symmetric matrices
+_LANES = 8  # columns that a processor takes at once: the library rounds what is left over otherwise
 
 
 @cache
@@ -164,11 +165,16 @@ class Pardiso(_Handle):
         return solution
 
     def half_solve(self, right: np.ndarray) -> np.ndarray:
-        """L^-1 P b for right-hand sides (n, r), A = P' L L' P: b' A^-1 c is the product of two halves."""
-        right = np.asfortranarray(right, dtype=np.float64)
-        half = np.empty_like(right, order="F")
-        self._call(331, right, half, right.shape[1])
-        return half
+        """L^-1 P b for right-hand sides (n, r), A = P' L L' P: b' A^-1 c is the product of two halves.
+
+        What a column gives does not hang, to the bit, on how many others there are.
+        """
+        count = right.shape[1]
+        whole = np.zeros((len(right), -(-count // _LANES) * _LANES), order="F")
+        whole[:, :count] = right
+        half = np.empty_like(whole, order="F")
+        self._call(331, whole, half, whole.shape[1])
+        return half[:, :count]
 
 
 class _Order(_Handle):

@@ -185,6 +185,16 @@ def test_nodes_eliminated_together_move_as_unknowns_one_by_one(box):
     assert np.allclose(one.T @ one, other.T @ other, rtol=1e-10)
 
 
+@pytest.mark.skipif(not available(), reason="MKL Pardiso is not there")
+def test_a_load_gives_the_same_bits_alone_and_among_others(box):
+    """A processor takes columns by four or eight; those that were left over were rounded otherwise."""
+    factor = Pardiso(Solver(box((5, 4, 3), (0.1, 0.07, 0.05)).quadratic(), 0.49).matrix)
+    loads = np.random.default_rng(3).normal(size=(factor.size, 40))
+    halves = factor.half_solve(loads)
+    for count in (1, 2, 3, 6, 11, 34):
+        assert (factor.half_solve(loads[:, 5 : 5 + count]) == halves[:, 5 : 5 + count]).all()
+
+
 def test_a_solver_has_the_stiffness_of_what_is_free(box):
     """Blocks of nodes are chosen, not numbers; springs under the base are added to them."""
     mesh = box((3, 2, 2), (0.1, 0.07, 0.05)).quadratic()
