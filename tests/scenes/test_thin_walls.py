@@ -44,8 +44,8 @@ def test_a_tube_presses_as_with_finer_tetrahedra():
     forces = []
     for size in (None, 0.0018):
         curve = pp.press(
-            pp.renderer(pp.model_of(tube, mesh_size_m=size)), at=np.array([0.02, 0, 0.025]),
-            direction=np.array([-1.0, 0, 0]), depth_m=6e-4,
+            pp.model_of(tube, mesh_size_m=size), at=(0.02, 0.0, 0.025), direction=(-1.0, 0.0, 0.0),
+            depth_m=6e-4,
         )  # fmt: skip
         forces.append(float(np.linalg.norm(curve.force[curve.deepest])))
     assert forces[0] == pytest.approx(forces[1], rel=0.02)
