@@ -167,7 +167,7 @@ def kept_places(model: Model) -> OnDemandCompliance | None:
 
 
 def _places_of(model: Model) -> tuple[str, Path | None]:
-    key = content_key("solved places 2", compliance_key(model, ComplianceOptions("dense")))
+    key = content_key("solved places 3", compliance_key(model, ComplianceOptions("dense")))
     return key, None if model.path is None else model.path / f"places-{key[:16]}.bin"
 
 

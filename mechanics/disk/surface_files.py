@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from palpate.mechanics.disk.gmsh1 import is_gmsh1, read_gmsh1
 from palpate.mechanics.disk.holes import close
@@ -35,6 +37,8 @@ BY_MESHIO = {".msh": "gmsh", ".inp": "abaqus"}
 SUFFIXES = (*BY_TRIMESH, *BY_VTK, *BY_MESHIO)
 UNITS = {unit: parse_unit(unit).scale for unit in ("m", "cm", "mm", "um", "in")}
 """Metres in a file's unit of length."""
+_FLAT = 1e-4
+"""Angle, rad, below which neighbours are one flat face."""
 LEAST_M, GREATEST_M = 0.002, 2.0
 """An object that a hand explores is so large across."""
 
@@ -232,21 +236,32 @@ def _cleaned(shell: trimesh.Trimesh) -> tuple[trimesh.Trimesh, tuple[str, ...]]:
 
 
 def _without_walls(shell: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    """The shell without pairs of triangles on the same nodes that look opposite ways, as bodies have that
-    share a face; None where there are none, or where that leaves it open, as of a surface drawn on both
-    sides."""
-    faces = np.asarray(shell.faces)
-    order = np.argsort(faces, axis=1)
-    side = np.linalg.det(np.eye(3)[order]).round()
-    _, same = np.unique(np.take_along_axis(faces, order, 1), axis=0, return_inverse=True)
-    left, count = np.bincount(same.ravel(), side), np.bincount(same.ravel())
-    if not ((count > 1) & (left == 0)).any():
+    """The shell without pairs of flat faces within the same edges that look opposite ways, as bodies have
+    that share a face, whichever way each is cut into triangles; None where there are none, or where that
+    leaves it open, as of a surface drawn on both sides."""
+    if shell.is_watertight:
+        return None
+    flat = shell.face_adjacency[shell.face_adjacency_angles < _FLAT]
+    graph = coo_matrix((np.ones(len(flat)), flat.T), shape=(len(shell.faces),) * 2)
+    _, face = connected_components(graph, directed=False)
+    edges = shell.edges.reshape(-1, 3, 2)
+    order = np.argsort(face, kind="stable")
+    outlines = [_outline(edges[own]) for own in np.split(order, np.cumsum(np.bincount(face))[:-1])]
+    known = set(outlines)
+    wall = np.array([frozenset((b, a) for a, b in outline) in known for outline in outlines])
+    if not wall.any():
         return None
     kept = shell.copy()
-    kept.update_faces(left[same.ravel()] != 0)
+    kept.update_faces(~wall[face])
     kept.update_faces(kept.unique_faces())
     kept.remove_unreferenced_vertices()
     return kept if len(kept.faces) and kept.is_watertight else None
+
+
+def _outline(edges: np.ndarray) -> frozenset[tuple[int, int]]:
+    """The directed edges of triangles (k, 3, 2) that none of them has the other way."""
+    own = {(int(a), int(b)) for a, b in edges.reshape(-1, 2)}
+    return frozenset((a, b) for a, b in own if (b, a) not in own)
 
 
 def _check_size(name: str, size: float, unit: str) -> None:

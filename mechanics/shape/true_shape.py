@@ -17,12 +17,15 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.shape.creases import Facets, angle_between, corner_normals_of, facets_of
-from palpate.mechanics.shape.nearest import closest
+from palpate.mechanics.shape.nearest import closest, triangle_areas
 
 _SAME_SIDE = np.cos(np.radians(50))
 _FACING = np.cos(np.radians(75))
 _SAMPLE_M = 1.2e-3
 """Longest edge of the pieces that curvatures are averaged over."""
+_MOST_PIECES, _PIECE = 1_000_000, 0.18
+"""So many pieces at about most, larger ones on an object beyond 0.26 m^2, where they took 3 GB; area of one
+over its longest edge squared."""
 _WIDTHS, _PAIRS = 2.7, 300_000
 """Widths of a Gaussian beyond which it is left out (0.03); pieces that are averaged at once."""
 
@@ -168,14 +171,17 @@ class TrueShape:
 
     @cached_property
     def _bends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, cKDTree]:
-        """Places, normals, areas and curvature tensors of pieces of the surface of at most _SAMPLE_M."""
+        """Places, normals, areas and curvature tensors of pieces of the surface of at most _SAMPLE_M, or as
+        small as _MOST_PIECES allow."""
         bend = _bends(self.vertices[self.triangles], self.corner_normals)
-        triangle, corners = _pieces(self.vertices[self.triangles], _SAMPLE_M)
+        surface = float(triangle_areas(self.vertices, self.triangles).sum())
+        longest = max(_SAMPLE_M, np.sqrt(surface / (_PIECE * _MOST_PIECES)))
+        triangle, corners = _pieces(self.vertices[self.triangles], longest)
         places, facing = self.on(triangle, corners.mean(axis=1))
         p = np.einsum("kcw,kwx->kcx", corners, self.vertices[self.triangles[triangle]])
         area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
         # pieces of one cell that look alike count as one: a fine file takes no longer
-        cell = np.hstack([np.floor(places / _SAMPLE_M), np.rint(3 * facing)]).astype(np.int64)
+        cell = np.hstack([np.floor(places / longest), np.rint(3 * facing)]).astype(np.int64)
         cell -= cell.min(axis=0)
         _, cell = np.unique(np.ravel_multi_index(tuple(cell.T), cell.max(axis=0) + 1), return_inverse=True)
         total = np.bincount(cell, area)

@@ -29,6 +29,9 @@ _PASSES = 8
 """Of optimisation: the solid's surface alone is taken, not its tetrahedra."""
 _ROUNDING = 3e-4
 """Of the diagonal: corners as near as this may be one corner, which a file holds in few digits."""
+_ASTRAY, _AT_ONCE = 0.05, 20_000_000
+"""Of the points that the triangles wind around: so many may lie outside of the solid, or others in it; points
+times triangles that are looked at."""
 _NEAR, _FOLLOWED, _SOLID = 0.01, 0.9, 0.02
 """How near the solid's surface, of the diagonal, triangles lie that it follows, and their least share of the
 area; the solid's least share of its box."""
@@ -60,13 +63,41 @@ def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> Close
     # walls between bodies that touch, and sheets inside of one, are no surface of it
     near |= inside(shell.vertices, shell.faces, there)
     followed = near.mean() >= _FOLLOWED and shell.is_watertight
-    if not followed or shell.volume < _SOLID * np.prod(np.ptp(vertices, axis=0)):
+    if (
+        not followed
+        or not _alike(shell, vertices, triangles)
+        or shell.volume < _SOLID * np.prod(np.ptp(vertices, axis=0))
+    ):
         raise refused
     reason = str(refused).removeprefix(f"'{refused.name}' ").split("; ")[0]
     note = f"it {reason}; filled by its winding number, {1e6 * shell.volume:.4g} cm³"
     return ClosedSurface(
         np.asarray(shell.vertices), np.asarray(shell.faces, dtype=np.int64), refused.name, (note,)
     )
+
+
+def _alike(shell: trimesh.Trimesh, vertices: np.ndarray, triangles: np.ndarray) -> bool:
+    """Whether the solid holds what the triangles wind around; the mesher may lose one of two that lie on one
+    another, and with it a body."""
+    count = int(np.clip(_AT_ONCE // len(triangles), 100, 2000))
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    points = np.random.default_rng(0).uniform(low, high, (count, 3))
+    meant = np.abs(winding(vertices, triangles, points)) > 0.5
+    astray = inside(shell.vertices, shell.faces, points) != meant
+    return bool(astray.sum() <= _ASTRAY * meant.sum())
+
+
+def winding(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k,) how often triangles wind around points (k, 3): 1 inside of a closed surface, 0 outside, and in
+    between where it is open (Jacobson and others 2013)."""
+    found = np.empty(len(points))
+    for k, point in enumerate(points):
+        a, b, c = (vertices[triangles[:, j]] - point for j in range(3))
+        la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+        solid = np.einsum("ij,ij->i", a, np.cross(b, c))
+        ab, bc, ca = (np.einsum("ij,ij->i", x, y) for x, y in ((a, b), (b, c), (c, a)))
+        found[k] = np.arctan2(solid, la * lb * lc + ab * lc + bc * la + ca * lb).sum() / (2 * np.pi)
+    return found
 
 
 def _boundary(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

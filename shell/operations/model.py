@@ -45,7 +45,7 @@ def model_of(
     ] = None,
     tip_radius_m: Annotated[float | None, option("radius of the tip; None: 0.005", unit="m")] = None,
     mesh_size_m: Annotated[
-        float | None, option("edge of the tetrahedra; None: 0.010 or an eighth", unit="m")
+        float | None, option("edge of the tetrahedra; None: 0.010, an eighth or half the wall", unit="m")
     ] = None,
     file: Given[MeshFileOptions],
     call: Call,

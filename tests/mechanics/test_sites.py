@@ -19,7 +19,12 @@ from palpate.mechanics.contact.touch import touch_force
 from palpate.mechanics.elastic.pardiso import available
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import MeshError
-from palpate.mechanics.shape.refine import refined_around, refined_near_surface, typical_edge
+from palpate.mechanics.shape.refine import (
+    MOST_TETRAHEDRA,
+    refined_around,
+    refined_near_surface,
+    typical_edge,
+)
 
 from .closed_forms import hertz_force
 
@@ -159,3 +164,13 @@ def test_curvature_of_a_bent_surface(box):
     bent = type(mesh)(points, mesh.tetrahedra, mesh.fixed, mesh.touchable)
     found = contact_curvature(bent, np.array([[0.0, 0.0, 0.03]]), UP[None])[0]
     assert found == pytest.approx(0.5 * (1 / 0.1 + 1 / 0.3), rel=0.05)
+
+
+def test_a_large_object_is_refined_as_far_as_memory_allows(box):
+    """A block of 250 mm: a round more would make 165,000 tetrahedra, four times what 2 GB hold."""
+    mesh = box((14, 14, 14), (0.25, 0.25, 0.25))
+    fine, parent = refined_near_surface(mesh, 0.006)
+    assert len(mesh.tetrahedra) < len(fine.tetrahedra) <= MOST_TETRAHEDRA
+    assert typical_edge(fine) == pytest.approx(0.5 * typical_edge(mesh), rel=0.01)
+    shares = np.bincount(parent, weights=fine.volumes, minlength=len(mesh.tetrahedra))
+    assert shares == pytest.approx(mesh.volumes, rel=1e-9)

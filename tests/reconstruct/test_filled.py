@@ -68,3 +68,39 @@ def test_a_sheet_stays_refused():
     sheet.update_faces((sheet.triangles_center[:, 2] > 0.02) | (np.arange(len(sheet.faces)) % 40 == 0))
     with pytest.raises(NotClosedError):
         solid_of(sheet)
+
+
+def test_layers_whose_walls_are_cut_into_other_triangles_are_one_solid(monkeypatch):
+    """Three layers of a cube, each a body of its own: the mesher lost one or another of them."""
+
+    def never(*_, **__):
+        raise AssertionError("the mesher was asked")
+
+    monkeypatch.setattr(filled, "tetrahedralize", never)
+    layers = [trimesh.creation.box(extents=(0.05, 0.05, 0.015)) for _ in range(3)]
+    for k, layer in enumerate(layers):
+        layer.apply_translation([0, 0, 0.015 * k])
+    found = solid_of(trimesh.util.concatenate(layers))
+    solid = trimesh.Trimesh(found.vertices, found.triangles, process=False)
+    assert solid.is_watertight and solid.volume == pytest.approx(0.05 * 0.05 * 0.045)
+    assert "joined" in found.notes[0]
+
+
+def test_a_fill_of_another_volume_is_refused(monkeypatch):
+    """A hollow block that the mesher gives as a full one: the cavity's triangles lie inside, as walls do."""
+    block, hollow = (trimesh.creation.box(extents=(edge, edge, edge)) for edge in (0.06, 0.045))
+    hollow.invert()
+    a, b = block.vertices[block.edges[0]]
+    fin = trimesh.Trimesh([a, b, (a + b) / 3], [[0, 1, 2]])  # an edge of three
+    full = box_mesh((4, 4, 4), (0.06, 0.06, 0.06))
+    points = full.points - full.points.min(axis=0) + block.bounds[0]
+    monkeypatch.setattr(filled, "tetrahedralize", lambda *_, **__: (points, full.tetrahedra))
+    with pytest.raises(NotClosedError):
+        solid_of(trimesh.util.concatenate([block, hollow, fin]))
+    assert "filled" in solid_of(trimesh.util.concatenate([block, fin])).notes[0]
+
+
+def test_a_closed_surface_winds_once_around_what_is_inside():
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.03)
+    points = np.array([[0.0, 0, 0], [0.01, 0.02, 0], [0.04, 0, 0]])
+    assert filled.winding(ball.vertices, ball.faces, points) == pytest.approx([1, 1, 0], abs=1e-9)

@@ -130,6 +130,16 @@ def test_a_direction_that_is_none_is_that_of_what_is_around():
     assert normals[0, 1] < 0, "it faces as what is beside it"
 
 
+def test_curvatures_of_a_large_shape_take_no_more_pieces_than_memory_allows():
+    """A ball of 0.6 m: pieces as fine as a small object's took gigabytes."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.3)
+    shape = TrueShape(np.asarray(ball.vertices), np.asarray(ball.faces))
+    point = np.array([[0.3, 0.0, 0.0]])
+    bent, _ = shape.curvatures(point, point / 0.3, 2e-3)
+    assert len(shape._bends[0]) < 400_000
+    assert bent == pytest.approx(np.full((1, 2), 1 / 0.3), rel=0.02)
+
+
 def test_curvatures_are_the_shapes_and_not_the_meshs():
     shape = filleted()
     wall, fillet = np.array([RADIUS, 0, 0.02]), FILLET / np.sqrt(2)
