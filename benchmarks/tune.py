@@ -177,13 +177,17 @@ def _figures(rows: list[dict[str, Any]]) -> list[Figure]:
         own = [row for row in rows if not name or row["simulator"] == name]
         said = f"{name}: " if name else ""
         shapes = [s for row in own for s in row["shapes"] if s["name"] != TUNED_ON]
-        won = [s["tuned_n"] < s["identified_n"] for s in shapes]
-        better = [s["tuned_n"] / s["before_n"] for s in shapes]
-        if not won:
+        if not shapes:
             continue
+        # a shape that there was no time to judge, whose gap is NaN, is not won
+        won = [s["tuned_n"] < s["identified_n"] for s in shapes]
         what = f"{said}tuned settings beat an identified modulus on unseen shapes, {sum(won)} of {len(won)}"
+        figures.append(Figure(what, 100 * float(np.mean(won)), unit="%").at_least(90))
+        shapes = [s for s in shapes if np.isfinite(s["tuned_n"])]
+        better = [s["tuned_n"] / s["before_n"] for s in shapes]
+        if not better:
+            continue
         figures += [
-            Figure(what, 100 * float(np.mean(won)), unit="%").at_least(90),
             Figure(f"{said}unseen shapes, error after over before, median", float(np.median(better))),
             Figure(
                 f"{said}unseen shapes, error with an identified modulus over before, median",
