@@ -109,7 +109,9 @@ class Runs:
         self._made: dict[tuple[Any, ...], Any] = {}
         self._ran: dict[tuple[Any, ...], tuple[TruePath, Sums, np.ndarray]] = {}
 
-    def renderer(self, values: Values, model: Model, friction: float | None = None) -> Any:
+    def renderer(
+        self, values: Values, model: Model, friction: float | None = None, progress: Progress = silent
+    ) -> Any:
         """The simulator with those settings over its own; the last few are kept, as some factorise."""
         given = self._given(values)
         key = given, id(model), friction
@@ -118,7 +120,7 @@ class Runs:
                 self._made.pop(next(iter(self._made)))
             rubs = self.options.friction if friction is None else friction
             options = dataclasses.replace(self.options, simulator_set=given, friction=rubs)
-            self._made[key] = create(self.name, model, options, on_demand=True)
+            self._made[key] = create(self.name, model, options, progress, on_demand=True)
         return self._made[key]
 
     def _given(self, values: Values) -> str:
@@ -139,7 +141,7 @@ class Runs:
 
     def _run(self, values: Values, path: TruePath, progress: Progress) -> tuple[Sums, np.ndarray]:
         begun = self.now()
-        made = self.renderer(values, path.model, path.friction)
+        made = self.renderer(values, path.model, path.friction, progress)
         ended: tuple[str, ...] = ()
         before = _cost(made)
         try:

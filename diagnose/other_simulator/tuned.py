@@ -59,9 +59,10 @@ class Tuned(Result):
     settings: of all that may be tuned; began: the same before. chosen, numbers: `--simulator-settings` and
     `--simulator-set` of the start. gap_before_n, gap_after_n: N rms on held-out presses; fitted_before_n,
     fitted_after_n: on those tuned on; noise_n: of the sensor; law_n: what an ideal elastic simulation leaves
-    of the latter; target_n: where tuning ends; least_n: the least that any settings reached. scale, scaled_n:
-    the factor on the modulus that would come nearest, and what it would leave. modulus_moved: share by which
-    the modulus that the simulator was given is off the model's. named: numerical effects of the diagnosis.
+    of the latter, NaN where there was no time for it; target_n: where tuning ends; least_n: the least that
+    any settings reached. scale, scaled_n: the factor on the modulus that would come nearest, and what it
+    would leave. modulus_moved: share by which the modulus that the simulator was given is off the model's.
+    named: numerical effects of the diagnosis.
     time_is_up: trials ended with the time; interrupted: or by this; undone: what there was no time for, whose
     numbers are NaN.
     `plot`: error over cost; `show`: nothing.
@@ -198,7 +199,7 @@ def tuned(
     before = pressed.off(
         start, "before", until(progress, begun, within_s, share + JUDGED * (1 - share), clock)
     )
-    target_n = NEAR * max(noise_n, law_n)
+    target_n = NEAR * (noise_n if math.isnan(law_n) else max(noise_n, law_n))
 
     def tell(trials: int, gap_n: float) -> None:
         words = f"{trials} settings tried, {1e3 * gap_n:.3g} mN off ({1e3 * target_n:.3g} asked)"

@@ -87,10 +87,11 @@ def _certified(result: Tuned) -> str:
 
 
 def _unreached(result: Tuned) -> str:
+    ideal = "not run in time" if math.isnan(result.law_n) else force_words(result.law_n)
     asked = (
         f"asked were {force_words(result.target_n)} (noise {force_words(result.noise_n)}, an ideal elastic "
+        f"simulation {ideal})"
     )
-    asked += f"simulation {force_words(result.law_n)})"
     if result.fitted_after_n <= result.target_n:
         return f"{asked}: met"
     ended = "it was interrupted" if result.interrupted else "the time was over" if result.time_is_up else ""

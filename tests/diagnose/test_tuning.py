@@ -21,6 +21,7 @@ from palpate.diagnosis.other_simulator.tuning import Budget, Search, Trial
 from palpate.exporting.settings import SUFFIXES
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.progress import TimeIsUp
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.options import DOCUMENTED, RenderOptions
 from palpate.render.registry import _SIMULATORS, simulator_names
@@ -70,7 +71,7 @@ class Springs(Adapter):
 def springs(monkeypatch):
     monkeypatch.setattr(
         "palpate.diagnosis.other_simulator.runs.create",
-        lambda name, model, options, on_demand: SimulatorRenderer(name, model, Springs, options),
+        lambda name, model, options, progress, on_demand: SimulatorRenderer(name, model, Springs, options),
     )
     mesh = box_mesh((4, 4, 2), (0.048, 0.048, TOP_M))
     support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))
@@ -189,7 +190,7 @@ def ticking(springs, monkeypatch):
     """Tunes springs within so many seconds of the clock, of which one run along a path takes about one."""
     monkeypatch.setattr(
         "palpate.diagnosis.other_simulator.runs.create",
-        lambda name, model, options, on_demand: SimulatorRenderer(name, model, Ticking, options),
+        lambda name, model, options, progress, on_demand: SimulatorRenderer(name, model, Ticking, options),
     )
     monkeypatch.setattr(Ticking, "clock_s", 0.0)
     monkeypatch.setattr(Ticking, "ends_at", math.inf)
@@ -239,6 +240,24 @@ def test_what_was_found_until_ctrl_c_is_kept_and_what_is_lacking_said(ticking, t
         written = replace(found, simulator="scikit-fem", began={}, settings=found.settings)
         assert "n_per_m" in written.save(tmp_path / "x.py").read_text()
     assert whole.interrupted is None
+
+
+@pytest.mark.slow
+def test_settings_are_tuned_where_our_ideal_model_took_too_long(springs, bench, monkeypatch):
+    """It says only how near to come. A first run compiles it: that took all the time, nothing was tuned."""
+    recording, model = bench.record(law="linear")
+
+    def created(name, model, options, progress, on_demand):
+        if name == "fem":
+            raise TimeIsUp
+        return SimulatorRenderer(name, model, Springs, options)
+
+    monkeypatch.setattr("palpate.diagnosis.other_simulator.runs.create", created)
+    how = {"renderer": "mujoco", "diagnosed": False, "shapes": False, "progress": False}
+    found = pp.tune(recording, model, **how)
+    assert found.trials > 1 and found.target_n == pytest.approx(1.05 * found.noise_n)
+    assert "an ideal elastic simulation not run in time" in "\n".join(found.lines())
+    assert not faults("tune", {"schema": identity("tune"), **found.as_json()})
 
 
 @pytest.mark.slow

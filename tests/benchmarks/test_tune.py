@@ -1,0 +1,24 @@
+"""What the benchmark of tuning counts."""
+
+import math
+
+from benchmarks.tune import _figures
+
+
+def _case(after_n):
+    shape = {"before_n": 0.04, "tuned_n": after_n, "identified_n": 0.02, "bound_n": 0.002}
+    return {
+        "simulator": "drake", "planted": {"damping_s": 0.06}, "cpu_s": 60.0, "modulus_moved": 0.0,
+        "modulus_would": 0.1, "modulus_identified": -0.3,
+        "shapes": [{"name": name, **shape} for name in ("cylinder", "dome")],
+    }  # fmt: skip
+
+
+def test_a_shape_that_there_was_no_time_to_judge_is_not_won():
+    found = _figures([_case(0.01), _case(math.nan)])
+    by = {figure.what: figure for figure in found}
+    won = by["tuned settings beat an identified modulus on unseen shapes, 1 of 2"]
+    assert won.value == 50.0 and not won.met
+    assert by["drake: unseen shapes, error after over before, median"].value == 0.25
+    none = _figures([_case(math.nan)])[0]
+    assert none.what.endswith("0 of 1") and none.value == 0.0
