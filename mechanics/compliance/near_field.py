@@ -107,9 +107,9 @@ def ball_law(
     felt, soft, (wide, shallow, deep) = _changes(solver, points, (patch_width_m, *widths), progress)
     if len(felt):
         outer = normals[felt, :, None] * normals[felt, None, :]
-        along = [np.einsum("kij,kij->k", outer, change) for change in (shallow, deep)]
-        whole, bend = _depth_law(*along, soft, solver.poisson_ratio, tip_radius_m)
-        law.far[felt] = deep - wide + (whole - along[1])[:, None, None] * outer
+        along, below = (np.einsum("kij,kij->k", outer, change) for change in (shallow, deep))
+        whole, bend = _depth_law(along, below, soft, solver.poisson_ratio, tip_radius_m)
+        law.far[felt] = deep - wide + (whole - below)[:, None, None] * outer
         law.bracing[felt] = bend / tip_radius_m
     return law
 
@@ -127,15 +127,18 @@ def _depth_law(
         c, g = (np.interp(x, grid(), table[:, column]) for column in (0, 3))
         return unit * c * (1 + bend * g) * x**1.5
 
+    def force(change: np.ndarray, depth: float) -> np.ndarray:
+        def beyond(x: np.ndarray) -> np.ndarray:
+            return x + np.maximum(change * dent(x), -_STIFFEST * x / 1.5) - depth
+
+        return dent(_root(beyond, np.zeros(len(change)), np.full(len(change), depth / (1 - _STIFFEST))))
+
+    forces = [force(change, depth) for change, depth in zip((shallow, deep), _DEPTHS, strict=True)]
+
     def bent(at: int, compliance: np.ndarray) -> np.ndarray:
         x = np.maximum(_DEPTHS[at] - compliance * forces[at], 0.05)
         return (forces[at] / dent(x) - 1) / np.interp(x, grid(), table[:, 3])
 
-    forces = []
-    for change, depth in zip((shallow, deep), _DEPTHS, strict=True):
-        x = _root(lambda x, c=change, d=depth: x + np.maximum(c * dent(x), -_STIFFEST * x / 1.5) - d,
-                  np.zeros(len(change)), np.full(len(change), depth / (1 - _STIFFEST)))  # fmt: skip
-        forces.append(dent(x))
     # beyond the shallow one by so many times their difference, the same bend serves both
     sign = np.sign(shallow - deep)
     times = _root(
