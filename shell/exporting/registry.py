@@ -37,8 +37,8 @@ def _page(path: Path, subject: Subject, **more: Any) -> tuple[str, ...]:
 @dataclass(frozen=True)
 class ExportFormat:
     """A program's file: its suffix, its writer, which returns what the format cannot say, how such a file
-    begins, and what to do with it ({path}: the file; commands between backticks). depth_radii: depth of a press
-    that nobody said, in radii of the tip."""
+    begins, and what to do with it ({path}: the file; commands between backticks). depth_radii: depth of a
+    press that nobody said, in radii of the tip."""
 
     suffix: str
     write: Writer
