@@ -24,7 +24,7 @@ class Output:
     def say(self, *lines: str) -> None:
         """Print lines for a person, unless standard output belongs to JSON."""
         if self.destination != "-" and lines:
-            print(*lines, sep="\n")
+            print(*lines, sep="\n", flush=True)  # a pipe or file shows it while the work goes on
 
     def json(self, value: Any) -> None:
         """Write the answer as JSON where that was asked for."""

@@ -18,6 +18,8 @@ from palpate.render.simulators.mujoco import MuJoCo, scene_xml
 FILE_SETTINGS = "material=1,skin_m=1e-4"
 """A file's flex is a Saint Venant-Kirchhoff solid, which gives way where it is crushed; its radius, by which
 the surface stands off, makes up for that in a shallow press."""
+DEPTH_RADII = 1 / 6
+"""Depth of a press that nobody said, in radii of the tip: a flex of a file softens under a deeper one."""
 DRIVE_N_PER_M = 1e7
 """Of the tip: a newton moves it by a tenth of a micrometre, and it follows what it is led to by 20 ms."""
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.exporting import abaqus, gmsh, mujoco, scripts, sofa, stl, usd
 from palpate.exporting.recorded import Recorded
-from palpate.exporting.subject import Subject, subject_of
+from palpate.exporting.subject import DEPTH_RADII, Subject, subject_of
 from palpate.mechanics.disk.surface_files import UNITS
 from palpate.mechanics.disk.writing import Kind, atomic_file
 from palpate.mechanics.errors import OptionError
@@ -37,12 +37,14 @@ def _page(path: Path, subject: Subject, **more: Any) -> tuple[str, ...]:
 @dataclass(frozen=True)
 class ExportFormat:
     """A program's file: its suffix, its writer, which returns what the format cannot say, how such a file
-    begins, and what to do with it ({path}: the file; commands between backticks)."""
+    begins, and what to do with it ({path}: the file; commands between backticks). depth_radii: depth of a
+    press that nobody said, in radii of the tip."""
 
     suffix: str
     write: Writer
     kind: Kind
     opened_by: str
+    depth_radii: float = DEPTH_RADII
 
 
 _SCRIPT = Kind("a script of palpate export", (b"# Palpate model",))
@@ -52,6 +54,7 @@ FORMATS = {
         mujoco.write,
         Kind("a scene of palpate export", (b"<!-- Palpate model",)),
         "look at it: `python -m mujoco.viewer --mjcf={path}`",
+        mujoco.DEPTH_RADII,
     ),
     "sofa": ExportFormat(
         ".scn",
@@ -172,7 +175,7 @@ def write(
         raise OptionError(f"--unit is '{unit}'; allowed are {allowed}")
     if depth_m is not None and not depth_m > 0:
         raise OptionError(f"--depth is {depth_m} m; it must be greater than 0")
-    subject = subject_of(model, at, depth_m)
+    subject = subject_of(model, at, depth_m, program.depth_radii)
     asked = at is not None or depth_m is not None
     more: dict[str, dict[str, Any]] = {
         "stl": {"unit": unit},

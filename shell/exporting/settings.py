@@ -33,6 +33,7 @@ def write_settings(path: Path | str, tuned: Tuned) -> Path:
     moved = "; ".join(f"{m.term}: {m.before:g} -> {m.after:g}" for m in tuned.moved) or "nothing moved"
     if tuned.simulator == "mujoco":
         mark = f"<!-- Palpate tuned settings: {moved.replace('--', '- -')} -->\n"
+        subject = subject_of(tuned.model, depth_radii=mujoco.DEPTH_RADII)
         text = mark + mujoco.text_of(subject, numbers, tuned.chosen)
     elif tuned.simulator in _SCRIPTED:
         text = scripts.text_of(subject, _SCRIPTED[tuned.simulator], numbers, tuned.chosen)

@@ -119,9 +119,15 @@ class Subject:
         return tuple(name for name in self.model.effects if not effect(name).in_material)
 
 
-def subject_of(model: Model, at: np.ndarray | None = None, depth_m: float | None = None) -> Subject:
+DEPTH_RADII = 0.5
+"""Depth of a press that nobody said, in radii of the tip."""
+
+
+def subject_of(
+    model: Model, at: np.ndarray | None = None, depth_m: float | None = None, depth_radii: float = DEPTH_RADII
+) -> Subject:
     """The press of a model that shows that it works: at: (3,) m, the surface point nearest to it is
-    pressed; None: the middle of the top. depth_m: None is half the tip's radius. Raises OptionError for a
+    pressed; None: the middle of the top. depth_m: None is `depth_radii` of the tip. Raises OptionError for a
     place further from the object than that is wide, or a depth beyond its height."""
     up, mesh = model.support.normal, model.mesh
     height = float(model.support.height(mesh.points).max())
@@ -146,5 +152,5 @@ def subject_of(model: Model, at: np.ndarray | None = None, depth_m: float | None
         model,
         spot[0],
         normal / np.linalg.norm(normal),
-        0.5 * model.tool.tip_radius_m if depth_m is None else float(depth_m),
+        depth_radii * model.tool.tip_radius_m if depth_m is None else float(depth_m),
     )

@@ -13,6 +13,7 @@ from palpate.importing.clocks import PARTS, POINTS_HZ, Stream, one_clock, slower
 from palpate.importing.frames import framed, is_on_tool, one_axis, tared
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import MOST_ODDS, Unclear, best
+from palpate.importing.pace import too_quick
 from palpate.importing.tables import Table
 from palpate.importing.units import SI
 from palpate.mechanics.errors import RecordingError
@@ -53,8 +54,9 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
             f"tables of {', '.join(map(str, sorted(rows)))} rows without a time cannot be joined: "
             "say --column t=NAME"
         )
-    if not timed and said.rate_hz:
-        steps = np.arange(rows.pop()) / said.rate_hz
+    numbered = not timed and bool(said.rate_hz)
+    if numbered:
+        steps = np.arange(rows.pop()) / float(said.rate_hz or np.nan)
         streams = {part: Stream(steps, s.values, s.source) for part, s in streams.items()}
         timed = True
         notes.append(f"no column of time: rows taken at {said.rate_hz:g} Hz")
@@ -89,6 +91,8 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
         poisson_ratio=None if thing.get("poisson_ratio") is None else float(thing["poisson_ratio"]),
         description=_description(said, not timed, read_hz),
     )
+    if numbered and (doubt := too_quick(recording)):
+        notes.append(doubt)
     return Understood(recording, columns, tuple(notes), not timed, read_hz, odds)
 
 

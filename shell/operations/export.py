@@ -46,7 +46,8 @@ def export(
         ),
     ] = None,
     depth_m: Annotated[
-        float | None, option("depth of the press; None: half the tip's radius", unit="m")
+        float | None,
+        option("depth of the press; None: half the tip's radius, a sixth for mujoco", unit="m"),
     ] = None,
     unit: Annotated[str, option("unit of an STL's lengths", metavar="UNIT")] = "m",
     against: Annotated[

@@ -87,7 +87,7 @@ def story(result: DemoResult) -> say.Story:
     yield say.Section("What did the hand do?", [
         say.Picture(
             lambda: force_figure(result),
-            "Force over time: first the base is traced (phase I), then the object is pressed.",
+            "Force over time: first the base is traced, then the object is pressed.",
             name="force",
         )
     ])  # fmt: skip

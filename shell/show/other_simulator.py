@@ -133,6 +133,8 @@ def _effect(name: str) -> Effect:
 
 LITTLE = 0.5
 """Share of a gap, above which one that nothing explains is said first."""
+LEAST_SHARE = 0.005
+"""Share of a gap that is rounded to none."""
 SHOWN = 0.02
 """Share of a gap that a bar can show."""
 _MOST = {
@@ -146,7 +148,7 @@ def verdict(result: SimulatedGap) -> str:
     """The answer in one sentence."""
     if result.coarse:
         told = spoken(result.effects) or "nothing"
-        return f"not settled: {result.coarse}; until then do not mend what is named: {told}"
+        return f"no verdict yet: {result.coarse}; until then do not mend what is named: {told}"
     first = max(PARTS, key=lambda name: result.parts[name].share)
     if settled := _settled(result):
         most = f"most of the gap is numerics: {settled}"
@@ -218,8 +220,8 @@ def _parts(result: SimulatedGap) -> say.Story:
     cards = []
     for name in PARTS:
         part = result.parts[name]
-        size = f"{force_words(part.gap_n)}, {percent(part.share)}"
-        if not part.names and abs(part.share) < 0.005:
+        size = f"{force_words(part.gap_n)}, {part_share(part.share)}"
+        if not part.names and abs(part.share) < LEAST_SHARE:
             size = "-"
         short_names = "; ".join(_named(result, part.names, spaced))
         yield say.Detail(f"{name}, {MEANING[name]}: {size}{short_names and f': {short_names}'}", on=say.TEXT)
@@ -231,6 +233,16 @@ def _parts(result: SimulatedGap) -> say.Story:
         on=say.TEXT,
     )
     yield say.Cards(cards)
+
+
+def part_share(share: float) -> str:
+    """A part's share of the gap's mean square; below 0 it hides another error, which is said."""
+    if share > -LEAST_SHARE:
+        return percent(share)
+    return (
+        f"{percent(share)} (once it is mended the gap's mean square is larger by {percent(-share)}: "
+        "it hides another error)"
+    )
 
 
 def _against_its_best(result: SimulatedGap) -> list[str]:

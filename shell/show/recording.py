@@ -30,14 +30,14 @@ def story(result: Recording) -> Story:
         + ("" if noise is None else f"; sensor noise {mn(noise, '.4g')} an axis")
     )
     traced = "not stated, found by reconstruction" if phase is None else f"{phase[0]:g} to {phase[1]:g} s"
-    yield Detail(f"phase I (the base is traced): {traced}")
+    yield Detail(f"tracing around the foot: {traced}")
 
 
 def draw(result: Recording, ax: Axes) -> None:
     """Force over time."""
     ax.plot(result.t, result.force_n, lw=0.7, color=COLOURS["measured"])
     if result.boundary_phase is not None:
-        ax.axvspan(*result.boundary_phase, color=COLOURS["base-tracing"], zorder=0, label="tracing (phase I)")
+        ax.axvspan(*result.boundary_phase, color=COLOURS["base-tracing"], zorder=0, label="tracing the foot")
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False)
     ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(result.t[0], result.t[-1]))
 

@@ -41,7 +41,7 @@ from palpate.mechanics.quantities import parse_unit
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.registry import create
 from palpate.render.replay import replay
-from palpate.show.other_simulator import keys_in_words, lead, verdict
+from palpate.show.other_simulator import keys_in_words, lead, part_share, verdict
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -531,7 +531,7 @@ def test_rows_too_far_apart_for_the_presses_settle_nothing(world):
     assert reading_error_n(0.1, presses) == pytest.approx(off, rel=0.25)
     asked = Asked(read(50), stated_of({}, model), OWN_CLOCK)
     result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
-    assert "unknown" in result.kind and verdict(result).startswith("not settled")
+    assert "unknown" in result.kind and verdict(result).startswith("no verdict yet")
     assert result.reasons.count(result.coarse) == 1
     enough = float(re.search(r"log at ([\d.]+) Hz", result.coarse)[1])
     assert not aligned(read(int(250 / enough)), presses, OWN_CLOCK).coarse
@@ -591,3 +591,9 @@ def test_every_effect_has_words_for_all_the_keys_that_an_answer_can_carry_of_it(
     assert said["mesh_stiffness"] == "0.82 times as stiff as it should be"
     assert "times the object's modulus" in said["stiffness_field"]
     assert said["stated_friction"] == "given none: it sticks, measured none: it sticks"
+
+
+def test_a_share_below_0_is_said_in_a_sentence():
+    plain = part_share(-0.66).replace("\N{NO-BREAK SPACE}", " ")
+    assert "larger by 66 %" in plain and "hides another error" in plain
+    assert not set("larger hides".split()) & set(part_share(0.4).split() + part_share(-0.004).split())

@@ -101,3 +101,12 @@ def test_a_batch_says_what_is_left_by_the_same_display(monkeypatch, tmp_path):
     monkeypatch.setattr(output, "Bar", Seen)
     run_with_bar((), tmp_path, workers=1)
     assert shown == [""]
+
+
+def test_what_is_said_on_the_way_reaches_a_pipe_at_once(tmp_path, monkeypatch):
+    """A pipe or a file is buffered: lines that were said before long work came after it."""
+    told = (tmp_path / "out.txt").open("w", encoding="utf-8")
+    monkeypatch.setattr(sys, "stdout", told)
+    output.Output().say("picture: rec.png")
+    assert (tmp_path / "out.txt").read_text() == "picture: rec.png\n"
+    told.close()

@@ -34,7 +34,7 @@ def force_over_time(ax: Axes, exploration: Measured) -> Axes:
     ax.plot(t[peaks], force[peaks], "+", ms=7, color=COLOURS["peak"], label="peak")
     first, last = exploration.boundary.interval
     if last > first:
-        ax.axvspan(t[first], t[last - 1], color=COLOURS["base-tracing"], zorder=0, label="tracing (phase I)")
+        ax.axvspan(t[first], t[last - 1], color=COLOURS["base-tracing"], zorder=0, label="tracing the foot")
     ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(t[0], t[-1]))
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=3)
     return ax

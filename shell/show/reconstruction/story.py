@@ -308,7 +308,7 @@ def meaning(result: Reconstruction) -> str:
         )
     if result.modulus:
         misfit = float(np.sqrt((result.modulus.press.rms_n**2).mean()))
-        words += f" One number for the whole object leaves {mn(misfit)} of a press unexplained."
+        words += f" With one modulus for the whole object, a press's force is off by {mn(misfit)} (rms)."
     return words
 
 

@@ -282,10 +282,10 @@ def test_mujoco_runs_the_scene_and_presses_back_alike(tmp_path):
     """Up to nu = 0.45 linear tetrahedra hardly lock; what is left is their coarseness under a narrow tip, and
     that a flex softens under a deep dent."""
     model = block(nu=0.45, ball=False, cells=(8, 7, 5))
-    depth = 0.0008
     with contextlib.chdir(tmp_path):  # MuJoCo leaves its warnings in a file where it runs
-        pp.export(model, "mujoco", tmp_path / "m.xml", depth_m=depth, progress=False)
+        pp.export(model, "mujoco", tmp_path / "m.xml", progress=False)  # at the depth that nobody said
         theirs = abs(flex_forces(tmp_path / "m.xml")[0, 2])
+    depth = float(0.03 + model.tool.tip_radius_m - _pressed(tmp_path / "m.xml")[2])
     ours = pp.press(model, (0, 0, 0.03), (0, 0, -1), depth, progress=False)
     peak = float(np.abs(ours.force[:, 2]).max())
     assert theirs == pytest.approx(peak, rel=0.1)

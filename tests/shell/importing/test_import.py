@@ -476,3 +476,22 @@ def test_rows_slower_than_a_recording_are_put_on_a_clock_that_can_be_read(tmp_pa
     again = pp.read_recording(tmp_path / "rec.csv")
     assert again.duration_s == pytest.approx(world["t"][-1], abs=0.05)
     assert again.description["recording"]["read_rate_hz"] == pytest.approx(20.0)
+
+
+def test_a_rate_ten_times_too_high_is_asked_about(tmp_path, shared_recordings):
+    """Rows without a time, of a hand sampled at 1 kHz: at 10 kHz it would press within hundredths of a
+    second; at half the rate it is merely slow."""
+    hand = pp.read_recording(shared_recordings / "silicone-1-cylinder.csv.gz")
+    rows = np.column_stack([hand.position, hand.force_on_tool])
+    header = "x [m],y [m],z [m],fx [N],fy [N],fz [N]"
+    np.savetxt(tmp_path / "log.csv", rows, header=header, delimiter=",", comments="", fmt="%.7g")
+
+    def doubts(stated_hz: float) -> list[str]:
+        made = pp.import_table(
+            tmp_path / "log.csv", tip_radius_m=hand.tip_radius_m, rate_hz=stated_hz, force_on="tool"
+        )
+        return [note for note in made.understood.notes if "--rate" in note]
+
+    assert doubts(1000.0) == [] and doubts(500.0) == []
+    (asked,) = doubts(10000.0)
+    assert "from first touch to the peak" in asked

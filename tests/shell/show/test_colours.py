@@ -20,7 +20,7 @@ THINGS = {  # label in a picture -> thing
     "measured": "measured", "rendered": "fem", "FEM": "fem", "FEM, one modulus": "fem-homogeneous",
     "Kelvin–Voigt spring": "kelvin-voigt", "Hunt–Crossley spring": "hunt-crossley", "simulated": "simplest",
     "simulated with what was found": "found", "first touch": "touch", "first touches": "touch",
-    "peak": "peak", "tracing (phase I)": "base-tracing", "sensor's noise": "noise",
+    "peak": "peak", "tracing the foot": "base-tracing", "sensor's noise": "noise",
     "measured, left out": "measured", "measured, fitted": "measured", "fixed base": "base",
 }  # fmt: skip
 
