@@ -215,7 +215,9 @@ def _disagree(deep: LawFit, shallow: LawFit, site: np.ndarray, far: np.ndarray) 
         return False
     certain = float(student.ppf(0.995, len(mean) - 2))
     # the trend over the sites' whole range, Theil-Sen, with the error of a least-squares line of that scatter
-    slope, intercept, _, _ = theilslopes(mean, compliance)
+    # places that are alike by symmetry differ by rounding, which is no line
+    alike = np.round(compliance / np.ptp(compliance), 9) * np.ptp(compliance)
+    slope, intercept, _, _ = theilslopes(mean, alike)
     error = _scatter(mean - intercept - slope * compliance) / (np.sqrt(len(compliance)) * np.std(compliance))
     return bool(abs(slope) * np.ptp(compliance) > max(certain * error * np.ptp(compliance), _AGREE))
 
