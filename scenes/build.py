@@ -31,7 +31,7 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.recording.files import recording_files
 from palpate.mechanics.recording.recording import read_recording
 from palpate.mechanics.shape.flat_foot import Standing, direction, standing
-from palpate.mechanics.shape.refine import typical_wall
+from palpate.mechanics.shape.refine import refined_near_surface, typical_edge, typical_wall
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.scenes.embedded import embedded_names, embedded_recording
@@ -269,6 +269,7 @@ def _built(
             stacklevel=3,
         )
     mesh = meshing.mesh.quadratic()
+    _tell_of_coarse_touches(mesh)
     material = replace(
         own,
         field=field(mesh) if field else None,
@@ -286,6 +287,21 @@ def _built(
         provenance=provenance,
     )
     return palpate_model(model, lambda s, f: progress(s, 0.4 + 0.6 * f))
+
+
+def _tell_of_coarse_touches(mesh: TetMesh) -> None:
+    """Warn where the surface of a large object is not halved to what a touch asks for."""
+    from palpate.mechanics.compliance.sites import SURFACE_EDGE_M
+
+    edge = typical_edge(refined_near_surface(mesh, SURFACE_EDGE_M)[0])
+    if edge > SURFACE_EDGE_M:
+        warnings.warn(
+            f"the object is large: touches are solved on tetrahedra of {1e3 * edge:.2g} mm at its surface, of "
+            f"{1e3 * SURFACE_EDGE_M:g} mm on others: near a rim or the base forces may be too small by 5 % or more; "
+            "cut out the part that is touched",
+            CoarserMesh,
+            stacklevel=4,
+        )
 
 
 def _usual_edge(stood: Standing) -> float:

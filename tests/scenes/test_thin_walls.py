@@ -8,6 +8,7 @@ import trimesh
 
 import palpate as pp
 from palpate.mechanics.shape.refine import typical_wall
+from palpate.scenes.build import CoarserMesh
 
 
 def _tube(wall_m: float) -> trimesh.Trimesh:
@@ -35,6 +36,15 @@ def test_a_block_is_meshed_as_its_length_says():
     block = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
     block.apply_translation([0, 0, 0.02])
     assert pp.model_of(block).mesh_size_m == pytest.approx(0.06 / 8)
+
+
+def test_a_surface_that_is_not_halved_is_said(monkeypatch):
+    """The limit of the work left out a round of halving without a word."""
+    block = trimesh.creation.box(extents=(0.1, 0.1, 0.05))
+    block.apply_translation([0, 0, 0.025])
+    monkeypatch.setattr("palpate.mechanics.shape.refine.MOST_TETRAHEDRA", 100)
+    with pytest.warns(CoarserMesh, match="near a rim or the base"):
+        pp.model_of(block)
 
 
 @pytest.mark.slow
