@@ -297,8 +297,8 @@ def _tell_of_coarse_touches(mesh: TetMesh) -> None:
     if edge > SURFACE_EDGE_M:
         warnings.warn(
             f"the object is large: touches are solved on tetrahedra of {1e3 * edge:.2g} mm at its surface, "
-            f"{1e3 * SURFACE_EDGE_M:g} mm on others: near a rim or the base forces may be too small by 5 % "
-            "or more; cut out the part that is touched",
+            f"{1e3 * SURFACE_EDGE_M:g} mm on others: near a rim or the base forces may be 3 % off and "
+            "more; cut out the part that is touched",
             CoarserMesh,
             stacklevel=4,
         )

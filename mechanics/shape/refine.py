@@ -9,8 +9,8 @@ from palpate.mechanics.shape.tetmesh import EDGES, TetMesh
 from palpate.mechanics.statistics import weighted_median
 
 MOST_TETRAHEDRA = 50_000
-"""Beyond it a round of halving is left out: 45,000 of a block of 250 mm (69,000 nodes) take 2.1 GB to
-factorise."""
+"""Beyond it a round of halving is left out. A block of 250 mm, pressed 4 mm deep: 2.9 GB for 13.1 with all
+rounds, the force in the middle of the top 0.3 % off, 10 mm from a rim 2.8 %."""
 _RAYS, _ITSELF = 200, 1e-6
 """Of a thickness; and how far, of the size, a ray starts from what it leaves."""
 
