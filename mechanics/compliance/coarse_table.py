@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial import cKDTree
 
-from palpate.mechanics.compliance.fine_corners import less_half_space, linear
+from palpate.mechanics.compliance.fine_corners import less_half_space, linear_at
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.smooth_field import correlation, spacing
 from palpate.mechanics.errors import MeshError
@@ -55,7 +55,11 @@ class CoarseCompliance:
         ones = self._inverse.sum(axis=1)
         self._level = ones @ six / ones.sum()
         self._weights = self._inverse @ (six - self._level)
-        self._bracing = solved.own_bracing
+        unsolved = np.flatnonzero(~solved.is_solved)
+        self._bracing = np.array(solved.own_bracing)
+        self._bracing[unsolved] = self._bracing[
+            self.known[cKDTree(points).query(self.own_points[unsolved])[1]]
+        ]
         self._ready = solved.ready()
 
     @property
@@ -88,12 +92,7 @@ class CoarseCompliance:
     def bracing_at(self, points: np.ndarray) -> np.ndarray:
         """(k,) 1/m, as SurfaceCompliance has it; of corners that are not solved that of the nearest one that
         is."""
-        known = self.own_points[self.known]
-        own = np.array(self._bracing)
-        rest = np.flatnonzero(np.isnan(own))
-        own[rest] = own[self.known[cKDTree(known).query(self.own_points[rest])[1]]]
-        _, triangle, weights = closest(self.own_points, self.own_triangles, points)
-        return linear(own[self.own_triangles[triangle]], weights)
+        return linear_at(points, self.own_points, self.own_triangles, self._bracing)
 
     def left_out(self) -> tuple[np.ndarray, np.ndarray]:
         """(p, 3, 3) each, 1/m, at the `first` places: the far field, and what the others alone tell of it;

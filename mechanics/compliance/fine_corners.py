@@ -29,6 +29,7 @@ from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.model.material import Ball
 from palpate.mechanics.plausible import USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.nearest import closest
 from palpate.mechanics.shape.refine import typical_edge
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 
@@ -132,9 +133,15 @@ def interpolated(corners: np.ndarray, middles: np.ndarray, weights: np.ndarray) 
     return np.einsum("kc,kcab->kab", triangle_shapes(2, weights), six)
 
 
-def linear(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """(k,) of the values (k, 3) at a triangle's corners each, at weights (k, 3)."""
-    return np.einsum("kc,kc->k", corners, weights)
+def linear_at(points: np.ndarray, corners: np.ndarray, triangles: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """(k,) at points (k, 3), linear in the nearest of triangles (g, 3) of corners (v, 3), from values (v,).
+
+    Nothing is sought where all that is known is zero, as on an object without balls.
+    """
+    if not np.nan_to_num(own).any():
+        return np.zeros(len(points))
+    _, triangle, weights = closest(corners, triangles, points)
+    return np.einsum("kc,kc->k", own[triangles[triangle]], weights)
 
 
 def less_half_space(own: np.ndarray, normals: np.ndarray, poisson_ratio: float, width_m: float) -> np.ndarray:

@@ -20,7 +20,7 @@ import numpy as np
 
 from palpate.mechanics.compliance.compression import own_compliance
 from palpate.mechanics.compliance.patch import PatchSampler
-from palpate.mechanics.contact.dent import dent_law, grid
+from palpate.mechanics.contact.dent import STIFFEST, dent_law, grid
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.plausible import USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
@@ -33,7 +33,6 @@ alone has 1/sqrt(5)); docs/explanation/mechanics.md."""
 _USUAL_DEPTH, _DEPTHS = 0.6, (0.3, 0.8)
 """In tip radii: of a contact that stands for all; at which `BallLaw` is exact."""
 _MOST_BEND, _MOST_TIMES = 1.2, 4.0
-_STIFFEST = 0.8  # of a contact's own compliance, as mechanics.contact.touch has it
 
 _NEGLIGIBLE = 1e-3  # of the contact's own compliance
 _BATCH = 32
@@ -129,9 +128,9 @@ def _depth_law(
 
     def force(change: np.ndarray, depth: float) -> np.ndarray:
         def beyond(x: np.ndarray) -> np.ndarray:
-            return x + np.maximum(change * dent(x), -_STIFFEST * x / 1.5) - depth
+            return x + np.maximum(change * dent(x), -STIFFEST * x / 1.5) - depth
 
-        return dent(_root(beyond, np.zeros(len(change)), np.full(len(change), depth / (1 - _STIFFEST))))
+        return dent(_root(beyond, np.zeros(len(change)), np.full(len(change), depth / (1 - STIFFEST))))
 
     forces = [force(change, depth) for change, depth in zip((shallow, deep), _DEPTHS, strict=True)]
 
@@ -146,7 +145,7 @@ def _depth_law(
         np.zeros(len(deep)), np.full(len(deep), _MOST_TIMES),
     )  # fmt: skip
     bend = np.clip(bent(1, shallow + times * (shallow - deep)), -_MOST_BEND, _MOST_BEND)
-    most = np.full(len(deep), 1 / (1 - _STIFFEST))
+    most = np.full(len(deep), 1 / (1 - STIFFEST))
     x = _root(lambda x: dent(x, bend) - forces[1], np.zeros(len(deep)), most)
     return (_DEPTHS[1] - x) / forces[1], bend
 

@@ -21,7 +21,7 @@ from palpate.mechanics.compliance.fine_corners import (
     corners_of,
     interpolated,
     less_half_space,
-    linear,
+    linear_at,
 )
 from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.compliance.sites import patch_width
@@ -87,8 +87,7 @@ class OnDemandCompliance:
 
     def bracing_at(self, points: np.ndarray) -> np.ndarray:
         """`SurfaceCompliance.bracing_at`, to the bit, of points that `far_at` was asked for."""
-        _, triangle, weights = closest(self.own_points, self.own_triangles, points)
-        return linear(self.own_bracing[self.own_triangles[triangle]], weights)
+        return linear_at(points, self.own_points, self.own_triangles, self.own_bracing)
 
     @property
     def is_solved(self) -> np.ndarray:

@@ -22,7 +22,7 @@ from palpate.mechanics.compliance.fine_corners import (
     interpolated,
     is_fine,
     less_half_space,
-    linear,
+    linear_at,
     normals_of,
 )
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
@@ -103,8 +103,7 @@ class SurfaceCompliance:
 
     def bracing_at(self, points: np.ndarray) -> np.ndarray:
         """(k,) 1/m, `own_bracing` at surface points (k, 3), linear in the nearest fine triangle."""
-        _, triangle, weights = closest(self.own_points, self.own_triangles, points)
-        return linear(self.own_bracing[self.own_triangles[triangle]], weights)
+        return linear_at(points, self.own_points, self.own_triangles, self.own_bracing)
 
     def displacement(self, corner: int, force: np.ndarray) -> np.ndarray:
         """(t, 3) m Pa: motion of all corners for a force (3,) N on the object at one, times the modulus."""

@@ -36,6 +36,8 @@ _RATIOS = {
 """Poisson's ratios that a sticking law is tabulated for; straight lines between and beyond."""
 
 
+STIFFEST = 0.8
+"""Of a contact's own compliance, the most that what is stiff close below may take away."""
 GRIPS = 0.7
 """Coulomb's friction from which a tip that goes straight in sticks."""
 

@@ -23,12 +23,11 @@ import numpy as np
 from numba import njit
 
 from palpate.mechanics.compliance.sites import TouchSites
-from palpate.mechanics.contact.dent import DentLaw, bend_of, dent_force, dent_law, effective_radius
+from palpate.mechanics.contact.dent import STIFFEST, DentLaw, bend_of, dent_force, dent_law, effective_radius
 from palpate.mechanics.contact.depth_factors import DepthFactors
 from palpate.mechanics.frames import local_frames
 from palpate.mechanics.kernels import kernel
 
-_STIFFEST = 0.8  # of a contact's own compliance, the most that a near support may take away
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
 _SLOW = 24  # turns after which the dent is sought by secants
 STATE_SIZE = 4 + 3 * _RINGS
@@ -73,8 +72,8 @@ def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
     k = stick * reach
     bu = free_u + stick * (cuu * mu + cuv * mv)
     bv = free_v + stick * (cuv * mu + cvv * mv)
-    m00, m01, m11 = max(1.0 + k * cuu, 1.0 - _STIFFEST), k * cuv, max(1.0 + k * cvv, 1.0 - _STIFFEST)
-    if m01 * m01 > _STIFFEST * m00 * m11 and not (cuu >= 0.0 and cuv * cuv <= cuu * cvv):
+    m00, m01, m11 = max(1.0 + k * cuu, 1.0 - STIFFEST), k * cuv, max(1.0 + k * cvv, 1.0 - STIFFEST)
+    if m01 * m01 > STIFFEST * m00 * m11 and not (cuu >= 0.0 and cuv * cuv <= cuu * cvv):
         m01 = 0.0  # what gives way against a force could turn it unstable; a slender body's own never does
     det = m00 * m11 - m01 * m01
     du = (m11 * bu - m01 * bv) / det
@@ -121,9 +120,9 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
     if not press > 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     cnn, cuu, cuv, cvv = far[0, 0], far[1, 1], far[1, 2], far[2, 2]
-    # no dent is deeper than what a stiffening support (1 / (1 - _STIFFEST)) makes of the whole displacement:
+    # no dent is deeper than what a stiffening support (1 / (1 - STIFFEST)) makes of the whole displacement:
     # a tip that is dragged far while it sticks must not run away
-    low, high = 0.0, (press + np.sqrt(d[1] * d[1] + d[2] * d[2])) / (1.0 - _STIFFEST)
+    low, high = 0.0, (press + np.sqrt(d[1] * d[1] + d[2] * d[2])) / (1.0 - STIFFEST)
     dent = state[1] if 0.0 < state[1] < high else 0.5 * press
     tolerance = 1e-10 * radius
     # a compliance that is positive definite as it is needs no limit
@@ -136,15 +135,15 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
         fn, stiffness, a = dent_force(table, dent, radius, bend, plane_strain_modulus)
         # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
         # that
-        compliance = max(cnn, -_STIFFEST / stiffness)
+        compliance = max(cnn, -STIFFEST / stiffness)
         # near an edge the coupling may exceed what keeps the joint compliance positive definite
         cun, cvn = far[1, 0], far[2, 0]
         couple = cun * cun + cvn * cvn
         held = stick * a
-        least = (1.0 / stiffness + compliance) * (1.0 / held + max(min(cuu, cvv), -_STIFFEST / held))
-        if couple > _STIFFEST * least and not sound:
-            cun *= np.sqrt(_STIFFEST * least / couple)
-            cvn *= np.sqrt(_STIFFEST * least / couple)
+        least = (1.0 / stiffness + compliance) * (1.0 / held + max(min(cuu, cvv), -STIFFEST / held))
+        if couple > STIFFEST * least and not sound:
+            cun *= np.sqrt(STIFFEST * least / couple)
+            cvn *= np.sqrt(STIFFEST * least / couple)
         # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
         fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[1] + cun * fn, d[2] + cvn * fn)
         excess = dent + compliance * fn - cun * fu - cvn * fv - press
