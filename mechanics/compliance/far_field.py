@@ -91,7 +91,7 @@ def _energies(places: Places) -> EnergyFields:
     if solver is None or len(solver.mesh.tetrahedra) != len(model.mesh.tetrahedra):
         solver = Solver(model.mesh.quadratic(), model.material.poisson_ratio)
     mesh = solver.mesh
-    sampler = _sampler(mesh)
+    sampler = load_sampler(mesh)
     m, q = len(mesh.tetrahedra), len(places.first)
     u = np.zeros((len(mesh.points), 3, 3 * q))
     flat = u.reshape(-1, 3 * q)
@@ -153,7 +153,8 @@ def bracing_at_poisson(places: Places, nu: float) -> np.ndarray:
     return places.bracing + gained * places.stage("base bracing", solve)
 
 
-def _sampler(mesh: TetMesh) -> PatchSampler:
+def load_sampler(mesh: TetMesh) -> PatchSampler:
+    """Of the load that the energies are of, as wide as the mesh bears."""
     return PatchSampler(mesh, PATCH_WIDTH_IN_EDGES * typical_edge(mesh))
 
 
@@ -174,7 +175,7 @@ def _unit_loads(places: Places, mesh: TetMesh, sampler: PatchSampler, some: slic
 
 def _far(places: Places, mesh: TetMesh, nu: float) -> np.ndarray:
     """(p, 3, 3) local far field at another Poisson's ratio: one factorisation."""
-    sampler, solver = _sampler(mesh), Solver(mesh, nu)
+    sampler, solver = load_sampler(mesh), Solver(mesh, nu)
     far = np.empty((len(places.first), 3, 3))
     for some in _batches(len(far)):
         loads = _unit_loads(places, mesh, sampler, some).reshape(3 * len(mesh.points), -1, 3)

@@ -30,7 +30,7 @@ _OF_CUT = 0.44 / np.sqrt(0.84)
 """Width of the Gaussian that stands for a contact, over the radius at which the sphere cuts the surface's
 plane, 0.48: axisymmetric contact solutions over balls 2 to 14 mm deep ask for 0.46 to 0.50 (Hertz's pressure
 alone has 1/sqrt(5)); docs/explanation/mechanics.md."""
-_USUAL_DEPTH, _DEPTHS = 0.6, (0.3, 0.8)
+_USUAL_DEPTH, BALL_DEPTHS = 0.6, (0.3, 0.8)
 """In tip radii: of a contact that stands for all; at which `BallLaw` is exact."""
 _MOST_BEND, _MOST_TIMES = 1.2, 4.0
 
@@ -102,22 +102,22 @@ def ball_law(
     """What balls below places (k, 3) of unit outward normals (k, 3) add beyond what their patches have of
     them, by depth. Costs eighteen solves a place that feels them, and `solver.plain`."""
     law = BallLaw.none(len(points))
-    widths = [contact_width(tip_radius_m, depth) for depth in _DEPTHS]
+    widths = [contact_width(tip_radius_m, depth) for depth in BALL_DEPTHS]
     felt, soft, (wide, shallow, deep) = _changes(solver, points, (patch_width_m, *widths), progress)
     if len(felt):
         outer = normals[felt, :, None] * normals[felt, None, :]
         along, below = (np.einsum("kij,kij->k", outer, change) for change in (shallow, deep))
-        whole, bend = _depth_law(along, below, soft, solver.poisson_ratio, tip_radius_m)
+        whole, bend = depth_law(along, below, soft, solver.poisson_ratio, tip_radius_m)
         law.far[felt] = deep - wide + (whole - below)[:, None, None] * outer
         law.bracing[felt] = bend / tip_radius_m
     return law
 
 
-def _depth_law(
+def depth_law(
     shallow: np.ndarray, deep: np.ndarray, softness: np.ndarray, poisson_ratio: float, tip_radius_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(compliance (k,) 1/m, bend (k,)) by which a touch has the forces at _DEPTHS that compliances (k,) of
-    those depths alone would give it."""
+    """(compliance (k,) 1/m, bend (k,)) by which a touch has the forces at BALL_DEPTHS that compliances (k,)
+    of those depths alone would give it."""
     table = np.array(dent_law("linear", poisson_ratio).table)
     unit = tip_radius_m / (softness * (1 - poisson_ratio**2))  # of forces over the radius, unit modulus
 
@@ -132,10 +132,10 @@ def _depth_law(
 
         return dent(_root(beyond, np.zeros(len(change)), np.full(len(change), depth / (1 - STIFFEST))))
 
-    forces = [force(change, depth) for change, depth in zip((shallow, deep), _DEPTHS, strict=True)]
+    forces = [force(change, depth) for change, depth in zip((shallow, deep), BALL_DEPTHS, strict=True)]
 
     def bent(at: int, compliance: np.ndarray) -> np.ndarray:
-        x = np.maximum(_DEPTHS[at] - compliance * forces[at], 0.05)
+        x = np.maximum(BALL_DEPTHS[at] - compliance * forces[at], 0.05)
         return (forces[at] / dent(x) - 1) / np.interp(x, grid(), table[:, 3])
 
     # beyond the shallow one by so many times their difference, the same bend serves both
@@ -147,7 +147,7 @@ def _depth_law(
     bend = np.clip(bent(1, shallow + times * (shallow - deep)), -_MOST_BEND, _MOST_BEND)
     most = np.full(len(deep), 1 / (1 - STIFFEST))
     x = _root(lambda x: dent(x, bend) - forces[1], np.zeros(len(deep)), most)
-    return (_DEPTHS[1] - x) / forces[1], bend
+    return (BALL_DEPTHS[1] - x) / forces[1], bend
 
 
 def _root(function: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:

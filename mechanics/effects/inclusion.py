@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from palpate.mechanics.compliance.far_field import energy_fields
+from palpate.mechanics.compliance.contact_energies import contact_energies
+from palpate.mechanics.compliance.near_field import BallLaw, depth_law
 from palpate.mechanics.compliance.pressed_places import Places
 from palpate.mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
 from palpate.mechanics.contact.edges import edge_law
@@ -37,11 +38,14 @@ hundredth of it, as strain energy falls with the fourth power of the distance.""
 STARTS = 6
 LEAST_M = 1e-3
 """Of a ball that lies inside: what is smaller is not felt."""
-_SCALE, _BENT = "inclusion_scale", "inclusion_bracing"
+_SOLVED = "inclusion, solved"
 _SCALE_LIMITS = (0.2, 8.0)
 FOUND = "diagnosed"
-_FAR = 40.0
-"""In soft edges beyond a ball: nothing of an element is in it."""
+LOG_RATIOS = (-1.2, -0.5, 0.5, 1.2, 2.2)
+_MOST_GONE = 0.8
+_MIRROR = 0.4
+"""Of a ball that nearly touches the free surface, whose image weakens a hard one and helps a soft one: with
+it first order is within 0.9 to 1.1 of what a mesh around the ball gives (balls 3 to 14 mm deep)."""
 _KNOWN = 16
 """Balls that are remembered: a fit moves first touches, and other effects, many times beside one ball."""
 
@@ -49,16 +53,6 @@ _KNOWN = 16
 def softness(ratio: float) -> float:
     """Factor on the compliance of the ball's elements for a modulus ratio (Eshelby, nu = 0.5)."""
     return 1 - 5 * (ratio - 1) / (2 * ratio + 3)
-
-
-def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float) -> np.ndarray:
-    """(m,) share of each element in the ball, with a soft edge of the elements' size."""
-    away = centroid - centre
-    beyond = (np.sqrt(np.einsum("mi,mi->m", away, away)) - radius) / (0.35 * blur)
-    near = np.flatnonzero(beyond < _FAR)
-    share = np.zeros(len(centroid))
-    share[near] = 1 / (1 + np.exp(np.maximum(beyond[near], -_FAR)))
-    return share
 
 
 def depths(points: np.ndarray, places: Places) -> np.ndarray:
@@ -71,6 +65,13 @@ def depths(points: np.ndarray, places: Places) -> np.ndarray:
     return np.linalg.norm(points - foot, axis=1) * np.where(outwards > 0, -1.0, 1.0)
 
 
+def _nearness(centres: np.ndarray, radii: np.ndarray, places: Places) -> np.ndarray:
+    """(k,) radius of each ball over its centre's distance to the surface that may be touched."""
+    mesh = places.model.mesh
+    foot = closest(mesh.points, mesh.touchable_surface[:, :3], centres)[0]
+    return radii / np.maximum(np.linalg.norm(centres - foot, axis=1), radii)
+
+
 def inside_object(values: np.ndarray, places: Places) -> np.ndarray:
     """The values with the radius held to what lies inside the object, so (5,)."""
     held = np.array(values, dtype=float)
@@ -78,40 +79,62 @@ def inside_object(values: np.ndarray, places: Places) -> np.ndarray:
     return held
 
 
-def first_order(values: np.ndarray, places: Places) -> np.ndarray:
-    """(p, 3, 3) 1/m, change of each press's compliance, unit modulus; first order in the ball's energy."""
-    known: dict[bytes, np.ndarray] = places.stage("balls", dict)
+def first_order(values: np.ndarray, places: Places) -> BallLaw:
+    """(p, 3, 3) 1/m, change of each press's compliance, and (p,) of its bracing, unit modulus; first order in
+    the ball's energy, under contacts of two depths."""
+    known: dict[bytes, BallLaw] = places.stage("balls", dict)
     key = values.tobytes()
     if key not in known:
-        values = inside_object(values, places)
         if len(known) >= _KNOWN:
             del known[next(iter(known))]
-        fields = energy_fields(places)
-        share = inside(fields.centroid, values[:3], values[3], fields.blur)
-        known[key] = fields.weighed(share * (softness(np.exp(values[4])) - 1))[places.place].astype(float)
-    return known[key].copy()
+        known[key] = _first_order(values, places)
+    return known[key]
+
+
+def _first_order(values: np.ndarray, places: Places) -> BallLaw:
+    held = inside_object(values, places)
+    far, normal = contact_energies(places).held(held[:3], held[3])
+    times = _change_of(held[4], float(_nearness(held[None, :3], held[3:4], places)[0]))
+    shallow, deep = times * normal
+    model = places.model
+    nu, tip = model.material.poisson_ratio, model.tool.tip_radius_m
+    whole, bend = depth_law(shallow, deep, np.ones(len(deep)), nu, tip)
+    far = times * far
+    far[:, 0, 0] += whole - deep
+    return BallLaw(far[places.place], bend[places.place] / tip)
+
+
+def _change_of(log_ratio: float, nearness: float) -> float:
+    """The factor on the energy that a ball holds which gives the change of the compliance."""
+    change = softness(np.exp(log_ratio)) - 1
+    return change / (1 - _MIRROR * change * nearness**3)
 
 
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
-    change = first_order(values, scene.places)
-    scale, bent = (scene.places.stages.get(name) for name in (_SCALE, _BENT))
-    if bent is not None:
-        settings.bracing = settings.bracing + bent * change[:, 0, 0]
-    settings.far = settings.far + (change if scale is None else change * scale[:, None, None])
+    far, bracing = first_order(values, scene.places)
+    known = scene.places.stages.get(_SOLVED)
+    if known is not None:
+        scale, bent = known
+        bracing = bracing * scale + far[:, 0, 0] * bent
+        far = far * scale[:, None, None]
+    settings.bracing = settings.bracing + bracing
+    settings.far = settings.far + far
 
 
 def _refine(scene: TouchedScene, values: np.ndarray) -> None:
     """Hold how much the ball changes each place, where a mesh fine around it is solved, over what first order
-    says: its compliance (p,), and the bracing (p,)."""
-    places, first = scene.places, first_order(values, scene.places)[:, 0, 0]
+    says: its compliance (p,), and what is left of the bracing, (p,) a unit of that."""
+    places = scene.places
+    first = first_order(values, places)
+    along = first.far[:, 0, 0]
     exact, bracing = (each[places.place] for each in solved_change(ball_of(values, places), places))
-    known = np.abs(first) > 1e-3 * np.abs(first).max()
-    over = np.where(known, first, 1.0)
+    known = np.abs(along) > 1e-3 * np.abs(along).max()
+    over = np.where(known, along, 1.0)
     scale = np.clip(np.where(known, exact / over, 1.0), *_SCALE_LIMITS)
-    places.stages[_SCALE] = scale
     # no more of one than of the other
-    share = np.divide(scale * first, exact, out=np.zeros_like(exact), where=known & (exact != 0))
-    places.stages[_BENT] = np.where(known, np.clip(share, 0.0, 1.0) * bracing / over, 0.0)
+    share = np.divide(scale * along, exact, out=np.zeros_like(exact), where=known & (exact != 0))
+    left = np.clip(share, 0.0, 1.0) * bracing - scale * first.bracing
+    places.stages[_SOLVED] = scale, np.where(known, left / over, 0.0)
 
 
 def solved_change(ball: Ball, places: Places) -> tuple[np.ndarray, np.ndarray]:
@@ -140,39 +163,31 @@ def ball_of(values: np.ndarray, places: Places) -> Ball:
 
 
 def _seek(scene: TouchedScene, misfit: Misfit) -> list[np.ndarray]:
-    """Balls on a grid inside the object, ranked by how well they explain the places' stiffness.
-
-    First order: the share of each place's compliance that lies in the ball, times how its force answers to
-    compliance, against each press's factor on the force, weighted, with a free common factor.
-    """
+    """Balls on a grid inside the object, ranked by how well they explain the places' stiffness, with a free
+    common factor: first order, but a place gives way no less than nothing."""
     places = scene.places
-    fields = energy_fields(places)
-    compliance = fields.energy[:, :, 0, 0]
-    centres = _centres(fields.centroid, places.point)
-    deep, blur = np.maximum(depths(centres, places), LEAST_M), fields.blur
-    weight, level = misfit.weight, misfit.level
+    energies = contact_energies(places)
+    centres = _centres(energies.point, places.point)
+    deep = np.maximum(depths(centres, places), LEAST_M)
+    weight = misfit.weight / misfit.weight.sum()
+    level = misfit.level - weight @ misfit.level
     found = []
     for radius in RADII_M:
         held = np.minimum(radius, deep)
-        share = np.array(
-            [inside(fields.centroid, c, r, blur) for c, r in zip(centres, held, strict=True)],
-            dtype=np.float32,
-        )
-        pattern = (compliance @ share.T)[places.place] * misfit.answer[:, None]
-        for centre, column in zip(centres, pattern.T, strict=True):
-            x = np.stack([np.ones_like(column), column], axis=1)
-            normal = x.T @ (weight[:, None] * x)
-            if abs(np.linalg.det(normal)) < 1e-12:
-                continue
-            side = x.T @ (weight * level)
-            beta = np.linalg.solve(normal, side)
-            # softness - 1 lies between -1.5 (hard) and 1.67 (void)
-            found.append((float(0.5 * beta @ side), centre, radius, float(np.clip(beta[1], -1.2, 1.3))))
-    found.sort(key=lambda item: -item[0])
+        for centre, own, close in zip(centres, held, _nearness(centres, held, places), strict=True):
+            felt, share = energies.inside(centre, own)
+            energy = energies.normal[:, :, felt].mean(axis=0) @ share.astype(np.float32)
+            for log_ratio in LOG_RATIOS:
+                # the share of the give that goes with the ball
+                gone = misfit.answer * _change_of(log_ratio, close) * energy[places.place]
+                stiffer = gone / (1 - np.minimum(gone, _MOST_GONE))
+                stiffer -= weight @ stiffer
+                found.append((float(weight @ (level - stiffer) ** 2), (*centre, radius, log_ratio)))
+    found.sort(key=lambda item: item[0])
     starts: list[np.ndarray] = []
-    for _, centre, radius, effect in found:
-        if all(np.linalg.norm(centre - s[:3]) > 1.5 * GRID_M or abs(radius - s[3]) > 1e-6 for s in starts):
-            starts.append(np.array([*centre, radius, _log_ratio(effect)]))
+    for _, start in found:
+        if all(np.linalg.norm(np.subtract(start[:3], s[:3])) > 1.5 * GRID_M for s in starts):
+            starts.append(np.array(start))
         if len(starts) == STARTS:
             break
     return starts
@@ -186,11 +201,6 @@ def _centres(centroid: np.ndarray, pressed: np.ndarray) -> np.ndarray:
     centres = np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1).T
     centres = centres[cKDTree(pressed).query(centres)[0] < REACH_M]
     return centres[cKDTree(centroid).query(centres)[0] < GRID_M]
-
-
-def _log_ratio(change: float) -> float:
-    grid = np.linspace(-1.8, 2.9, 200)
-    return float(grid[np.argmin([abs(softness(np.exp(g)) - 1 - change) for g in grid])])
 
 
 def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:

@@ -207,13 +207,13 @@ def test_a_ball_lies_inside_the_object(model):
     deep = np.array([0.0, 0.0, 0.03, 0.025, np.log(6.0)])
     ball = ball_of(deep, places)
     assert ball.radius_m == pytest.approx(0.01, abs=1e-6), "10 mm below the top"
-    assert (first_order(deep, places) == first_order(np.array([*deep[:3], 0.01, deep[4]]), places)).all()
+    asked, held = (first_order(np.array([*deep[:3], r, deep[4]]), places) for r in (0.025, 0.01))
+    assert asked.far == pytest.approx(held.far, rel=1e-6)
     assert ball_of(np.array([0.0, 0.0, 0.06, 0.01, 0.5]), places).radius_m < 0.002, "outside there is none"
 
 
 @pytest.mark.slow
 def test_a_ball_that_is_fitted_changes_a_place_as_the_rendered_one_does(model):
-    """A ball 6 mm below a tip gives more than twice what first order in a coarse mesh says."""
     places, ball = at_top(model), Ball((0.0, 0.0, 0.024), 0.01, 6.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(made, "SURFACE_EDGE_M", SURFACE_EDGE_M)
@@ -226,11 +226,24 @@ def test_a_ball_that_is_fitted_changes_a_place_as_the_rendered_one_does(model):
     rows = [np.linalg.norm(table.own_points - TOP, axis=1).argmin() for table in (plain, with_ball)]
     own = [table.own[row] for table, row in zip((plain, with_ball), rows, strict=True)]
     rendered = float(UP @ (own[1] - own[0]) @ UP)
-    values = np.array([*ball.centre_m, ball.radius_m, np.log(ball.modulus_ratio)])
     change, bracing = solved_change(ball, places)
     assert change[0] == pytest.approx(rendered, rel=0.1)
     assert bracing[0] == pytest.approx(with_ball.own_bracing[rows[1]], rel=0.1) and bracing[0] < -20
-    assert abs(first_order(values, places)[0, 0, 0]) < 0.5 * abs(rendered)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "ball",
+    [(0.0, 0.0, 0.024, 0.010, 6.0), (0.0, 0.0, 0.018, 0.010, 15.0), (0.006, 0.0, 0.026, 0.007, 0.3)],
+)
+def test_first_order_knows_a_ball_by_how_much_it_matters_under_a_contact(model, ball):
+    """By the energies of elements of 20 mm alone a ball 6 mm below a tip changed it by half as much."""
+    places = at_top(model)
+    first = first_order(np.array([*ball[:4], np.log(ball[4])]), places)
+    change, bracing = solved_change(Ball(ball[:3], *ball[3:]), places)
+    print(first.far[0, 0, 0] / change[0], first.bracing[0] / bracing[0])
+    assert 0.7 < first.far[0, 0, 0] / change[0] < 1.4
+    assert 0.6 < first.bracing[0] / bracing[0] < 1.6
 
 
 class Named:

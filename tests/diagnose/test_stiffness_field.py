@@ -7,7 +7,7 @@ import pytest
 
 from palpate.diagnosis.forward.prediction import build_forward
 from palpate.diagnosis.forward.touches import touches_of
-from palpate.mechanics.compliance.far_field import _sampler, _unit_loads, energy_fields
+from palpate.mechanics.compliance.far_field import _unit_loads, energy_fields, load_sampler
 from palpate.mechanics.compliance.field_response import far_of, shares_in_elements
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.elastic.solver import Solver
@@ -72,7 +72,7 @@ def test_first_order_is_near_a_new_factorisation(forward):
     fields = energy_fields(places)
     ratio = np.exp(0.25 * np.sin(fields.centroid @ np.array([60.0, 45.0, 30.0])))
     mesh = places.model.mesh
-    loads = _unit_loads(places, mesh, _sampler(mesh), slice(None)).reshape(3 * len(mesh.points), -1, 3)
+    loads = _unit_loads(places, mesh, load_sampler(mesh), slice(None)).reshape(3 * len(mesh.points), -1, 3)
 
     def own(ratio: np.ndarray | None) -> np.ndarray:
         solver = Solver(mesh, places.model.material.poisson_ratio, ratio)
