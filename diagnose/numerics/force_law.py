@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
@@ -52,7 +52,6 @@ def _words(keys: Keys) -> str:
 
 EFFECT = NumericalEffect(
     name="force_law",
-    domain=DOMAIN,
     scope=Scope.EVERYWHERE,
     words="the force goes with another power of the depth than a solid's 1.5",
     plain_words="the simulated force grows with depth in another way than that of a solid, as pressure "
