@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import math
 import shutil
 import sys
 import threading
-from pathlib import Path
 from typing import Any, Self
 
 from palpate.mechanics.disk.writing import JSON, atomic_file
 from palpate.mechanics.progress import Remaining
+from palpate.mechanics.result import plain
 
 
 class Output:
@@ -41,27 +39,6 @@ def emit_json(value: Any, destination: str | None) -> None:
         return
     with atomic_file(destination, JSON) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
-
-
-def plain(value: Any) -> Any:
-    """A value that JSON can hold: arrays as lists, numbers that are not finite as null; of a dataclass what
-    its `as_json` gives, else its fields, each by the name in its metadata ("json") or its own."""
-    import numpy as np
-
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        if hasattr(value, "as_json"):
-            return plain(value.as_json())
-        named = {f.metadata.get("json", f.name): getattr(value, f.name) for f in dataclasses.fields(value)}
-        return plain(named)
-    if isinstance(value, dict) or hasattr(value, "items"):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [plain(v) for v in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value
 
 
 _REDRAWN_S, _SHORT_S = 1.0, 5.0

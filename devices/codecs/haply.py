@@ -28,12 +28,13 @@ _UNREADABLE = (ValueError, TypeError, AttributeError, KeyError, OverflowError, R
 class HaplyConfig:
     """What a service of 3.5 or later tells of the way from a command to the hand; None: it does not tell.
 
-    preset, basis: names. mount_scale, mount_turn: of the mount's transform; the turn is the
+    preset, basis: names. mount_scale, mount_position, mount_turn: of the mount's transform; the turn is the
     angle of its rotation, rad. damping_n_s_per_m: the greatest of the filter's; force_gate: its gain.
     """
 
     preset: str | None = None
     basis: str | None = None
+    mount_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     mount_turn_rad: float = 0.0
     mount_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     damping_n_s_per_m: float | None = None

@@ -17,7 +17,7 @@ PHASES = (LOADING, HOLDING, UNLOADING)
 def gap_by_bin(
     square: np.ndarray, press: np.ndarray, presses: int, depth: np.ndarray, phase: np.ndarray, t: np.ndarray
 ) -> dict[str, list[float]]:
-    """N rms of a gap's 3-vector: `press_n` (presses,), and `depth_n`, `phase_n`, `time_n` (3,); 0 in an empty bin.
+    """N rms of a gap's 3-vector: `press_n` (presses,), `depth_n`, `phase_n`, `time_n` (3,); 0 for none.
 
     square: (n,) N^2, the gap's squared length, less what chance adds to it where it was measured (then it may
     be negative). press: (n,) of 0 to presses - 1. depth: (n,) in any unit, in thirds of the greatest. phase:

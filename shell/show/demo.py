@@ -130,7 +130,7 @@ def diagnosis_json(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
 
 def _loop(servo: ServoReport) -> list[list[str]]:
     """What the loop did, in words."""
-    compute = servo.compute.summary()
+    compute = servo.compute.as_json()
     return [
         ["forces given", f"{servo.ticks} in {servo.seconds:.1f} s"],
         ["skipped, since the machine was busy", str(servo.missed_ticks)],

@@ -15,8 +15,7 @@ from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.recording.recording import read_recording
 from palpate.operations.simulate import effects_from
 from palpate.scenes.laboratory.effects import REGISTRY
-from palpate.scenes.laboratory.effects.contact import UNNAMED
-from palpate.scenes.laboratory.effects.contact import relaxed
+from palpate.scenes.laboratory.effects.contact import UNNAMED, relaxed
 from palpate.scenes.laboratory.sealing import opened
 from palpate.scenes.laboratory.session import Staging
 from palpate.scenes.laboratory.simulate import SimulateOptions, simulate
