@@ -87,8 +87,11 @@ class ContactSurface:
         return float(np.median(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2)))
 
 
-def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_000) -> ContactSurface:
-    """Round and refine a mesh's boundary to about `edge_m`, with at most about `largest` triangles.
+LARGEST = 60_000
+
+
+def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3) -> ContactSurface:
+    """Round and refine a mesh's boundary to about `edge_m`, with at most about LARGEST triangles.
 
     Where the mesh's shape is known every vertex is put onto it, and edges are halved where it bends.
     Raises MeshError where the boundary is not closed.
@@ -99,7 +102,7 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     edges = mesh.points[corners] - mesh.points[np.roll(corners, 1, axis=1)]
     longest = float(np.median(np.linalg.norm(edges, axis=2)))
     parts = max(1, round(longest / edge_m))
-    while parts > 1 and len(corners) * parts**2 > largest:
+    while parts > 1 and len(corners) * parts**2 > LARGEST:
         parts -= 1
     barycentric, cells = _lattice(parts)
     corner_normals = _corner_normals(mesh.points, corners, touchable)
@@ -116,7 +119,7 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     if shape is not None:
         feet = Feet(shape)
         vertices, triangles, within, parent_weights = halved_where_bent(
-            feet, vertices, triangles, free, parent_weights, largest
+            feet, vertices, triangles, free, parent_weights, LARGEST
         )
         free, parents = free[within], parents[within]
         placed = on_shape(feet, vertices, triangles, free, parent_weights)

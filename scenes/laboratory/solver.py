@@ -26,17 +26,19 @@ class LabError(PalpateError):
     """A load step of the virtual laboratory found no equilibrium."""
 
 
+_MIXED = 4
+
+
 class Mixing:
     """Anderson's acceleration (1965) of a fixed-point iteration: the step that its last steps foretell."""
 
-    def __init__(self, most: int = 4) -> None:
-        self._most = most
+    def __init__(self) -> None:
         self._x: list[np.ndarray] = []
         self._g: list[np.ndarray] = []
 
     def __call__(self, x: np.ndarray, g: np.ndarray) -> np.ndarray:
         """The step to take from x where the iteration alone would step by g."""
-        self._x, self._g = [*self._x[-self._most :], x], [*self._g[-self._most :], g]
+        self._x, self._g = [*self._x[-_MIXED:], x], [*self._g[-_MIXED:], g]
         if len(self._x) == 1:
             return g
         dx, dg = np.diff(self._x, axis=0).T, np.diff(self._g, axis=0).T

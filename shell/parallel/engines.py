@@ -24,7 +24,7 @@ _SHARE = 0.9
 _AHEAD = 2, 32
 """Jobs that Dask is given at once, so many a thread of its workers and so many more: none of them waits for
 this process, also where they are short."""
-_CONNECT_S, _COUNT_S = 10.0, 2.0
+_CONNECT_S, _COUNT_S, _PATIENCE_S = 10.0, 2.0, 900.0
 
 
 class Engine(Protocol):
@@ -66,14 +66,14 @@ class LocalEngine:
 class DaskEngine:
     """Use as `with DaskEngine(address) as engine`; leaving the block ends what still runs.
 
-    address: of the scheduler, "tcp://HOST:PORT". patience_s: how long a scheduler that went away is waited
-    for. Raises OptionError where Dask is not installed or no scheduler answers.
+    address: of the scheduler, "tcp://HOST:PORT". Raises OptionError where Dask is not installed or no
+    scheduler answers.
     """
 
     memory_bytes: int | None = None
 
-    def __init__(self, address: str, patience_s: float = 900.0) -> None:
-        self.address, self.patience_s, self._run = address, patience_s, uuid.uuid4().hex
+    def __init__(self, address: str) -> None:
+        self.address, self._run = address, uuid.uuid4().hex
         self._given: dict[Future[Answer], Any] = {}
         self._threads, self._counted_at = 0, -_COUNT_S
         self._client = self._connected(_CONNECT_S)
@@ -107,7 +107,7 @@ class DaskEngine:
     def _connect_again(self) -> None:
         """Wait for a scheduler that went away; what it had is lost."""
         self._client.close(timeout=2)
-        self._client = self._connected(self.patience_s)
+        self._client = self._connected(_PATIENCE_S)
         for future in list(self._given):
             future.cancel()
 
