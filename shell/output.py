@@ -6,7 +6,8 @@ import json
 import shutil
 import sys
 import threading
-from typing import Any, Self
+from contextlib import AbstractContextManager
+from typing import Any
 
 from palpate.mechanics.disk.writing import JSON, atomic_file
 from palpate.mechanics.progress import Remaining
@@ -49,7 +50,7 @@ def progress_bar(label: str) -> Bar:
     return Bar(label)
 
 
-class Bar:
+class Bar(AbstractContextManager["Bar"]):
     """The one display of every wait: on a terminal a bar with the stage and what is left of it, which goes on
     while a stage tells of nothing; elsewhere nothing, so that standard error holds errors alone."""
 
@@ -103,9 +104,6 @@ class Bar:
         if self._terminal:
             self._thread.join()
         self._bar.close()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

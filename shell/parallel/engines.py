@@ -8,9 +8,10 @@ import os
 import time
 import uuid
 from concurrent.futures import CancelledError, Future, InvalidStateError, ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import psutil
 
@@ -39,16 +40,13 @@ class Engine(Protocol):
         """Do a job (`Task.job`); the lower its order, the sooner. It is cancelled where it was lost."""
 
 
-class LocalEngine:
+class LocalEngine(AbstractContextManager["LocalEngine"]):
     """Use as `with LocalEngine(workers) as engine`; leaving the block kills what still runs."""
 
     def __init__(self, workers: int | None = None, memory_bytes: int | None = None) -> None:
         self.workers = workers or cores()
         self.memory_bytes: int | None = memory_bytes or int(_SHARE * available_bytes())
         self._run, self._threads = uuid.uuid4().hex, ThreadPoolExecutor(self.workers)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)
@@ -63,7 +61,7 @@ class LocalEngine:
         return self._threads.submit(in_own_process, job, self._run)
 
 
-class DaskEngine:
+class DaskEngine(AbstractContextManager["DaskEngine"]):
     """Use as `with DaskEngine(address) as engine`; leaving the block ends what still runs.
 
     address: of the scheduler, "tcp://HOST:PORT". Raises OptionError where Dask is not installed or no
@@ -77,9 +75,6 @@ class DaskEngine:
         self._given: dict[Future[Answer], Any] = {}
         self._threads, self._counted_at = 0, -_COUNT_S
         self._client = self._connected(_CONNECT_S)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         with contextlib.suppress(Exception):  # a scheduler that is gone holds nothing of ours

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -57,7 +57,7 @@ class SessionOptions:
     pictures: bool = True
 
 
-class TouchSession:
+class TouchSession(AbstractContextManager["TouchSession"]):
     """Use in a `with` statement, after which every force is zero and the servo is gone.
 
     servo: its client. beside_name: the second renderer, '' for none. has_force: whether the device gives any.
@@ -311,8 +311,7 @@ class TouchSession:
             modulus = self.young_modulus_pa * factor
             self.servo.set_modulus(modulus)
             self._drawn.set_modulus(modulus)
-            if self._beside is not None:
-                self._beside.change(self._drawn.load(self._beside.name))
+            self._follow_drawn()
 
         self.worker.run("changing the modulus", job)
 
@@ -374,9 +373,6 @@ class TouchSession:
                 rest.callback(each)
             if self.recording is not None:
                 self.recording.collect()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *error: object) -> None:
         self.close()

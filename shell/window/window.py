@@ -92,7 +92,7 @@ class TouchWindow:
         self._known = KnownSoFar(self.plotter)
         self._axes = AxesGizmo(self._first)
         self.plotter.subplot(0, 2)
-        self._charts = LiveCharts(self.plotter, session.trace.seconds)
+        self._charts = LiveCharts(self.plotter, session.trace.SECONDS)
         points, triangles = self.pictures[0].rest_surface
         support, radius = session.model.support, session.servo.tip_radius_m
         self.pointer = Pointer(points, triangles, radius, support.point, support.normal)
