@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.shape.nearest import facings
+
 
 def stable_stiffness_n_per_m(
     max_stiffness_n_per_m: float, rate_hz: float = 1000.0, delay_ticks: float = 0.0
@@ -41,9 +43,7 @@ def series_compliance_m_per_n(stiffest_n_per_m: float, limit_n_per_m: float) -> 
 def stiffest_n_per_m(renderer: Any, max_force_n: float) -> float:
     """The greatest normal stiffness felt anywhere below `max_force_n`, by presses all over the surface."""
     points, triangles = renderer.surface
-    corners = points[triangles[:, :3]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    corners, (_, normals) = points[triangles[:, :3]], facings(points, triangles)
     greatest = 0.0
     for k in np.unique(np.linspace(0, len(triangles) - 1, _PLACES).astype(int)):
         state = renderer.start()

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.errors import MeshError
-from palpate.mechanics.shape.nearest import neighbours
+from palpate.mechanics.shape.nearest import facings, neighbours
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.render.surface.bvh import Bvh, build_bvh
 from palpate.render.surface.shaped import (
@@ -30,7 +30,7 @@ from palpate.render.surface.shaped import (
     halved_where_bent,
     on_shape,
 )
-from palpate.render.surface.triangles import faces, pseudonormals
+from palpate.render.surface.triangles import pseudonormals
 
 CREASE_DEGREES = 35.0
 
@@ -145,7 +145,7 @@ def with_vertices(
     vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, free: np.ndarray
 ) -> SurfaceArrays:
     """The kernels' arrays for these vertices: normals, pseudonormals and search tree."""
-    area, face = faces(vertices, triangles)
+    area, face = facings(vertices, triangles)
     edge_pseudo = face[:, None, :] + face[neighbours]
     return SurfaceArrays(
         vertices=np.ascontiguousarray(vertices),
@@ -228,9 +228,7 @@ def _smooth_normals(
 
 def _corner_normals(points: np.ndarray, triangles: np.ndarray, touchable: np.ndarray) -> np.ndarray:
     """(k, 3, 3) unit normals of each corner, averaged over the faces joined to it without a crease."""
-    p = points[triangles]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    face = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
+    area, face = facings(points, triangles)
     k = len(triangles)
     across = neighbours(triangles)
     rows, columns = [], []
