@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                     "late": seen.late,
                     "missed": seen.missed,
                     "ratio_to_empty": seen.late / base.late if base.late else None,
-                    "lateness_us": seen.lateness.summary(),
+                    "lateness_us": seen.lateness.as_json(),
                     "cpu_s": seen.cpu_s,
                     "wall_s": seen.wall_s,
                     "real_time": word or "SCHED_FIFO",
@@ -84,8 +84,8 @@ def _kept(row: dict[str, Any], name: str) -> Figure:
 
 def _figures(seen: Measured) -> dict[str, Any]:
     return {
-        "wall_us": seen.compute.summary(),
-        "cpu_us": seen.cpu.summary(),
+        "wall_us": seen.compute.as_json(),
+        "cpu_us": seen.cpu.as_json(),
         "cpu_s": seen.cpu_s,
         "wall_s": seen.wall_s,
         "ticks": seen.ticks,

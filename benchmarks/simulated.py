@@ -44,6 +44,7 @@ from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.result import plain
 from palpate.output import progress_bar
 from palpate.scenes.laboratory.sealing import digest
 
@@ -211,7 +212,7 @@ def _adapter_row(
     return {
         "truth": truth, "salt": salt, "sealed": sealed, "late_sensor": world.late, "sizes_n": sizes,
         "right": right, "own": [*verdict.own.effects] if verdict.own else [], "own_share": off,
-        "made_up": [each.as_json() for each in verdict.made_up], "named": named,
+        "made_up": plain(verdict.made_up), "named": named,
         "times_visible": sizes[largest] / least if largest else 0.0,
         "left_n": gaps.get(rest, verdict.gap_before_n), "kind": verdict.kind,
         "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),

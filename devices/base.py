@@ -135,11 +135,6 @@ class Availability:
         return not self.why_not
 
 
-def age_s(state: TipState, now_s: float) -> float:
-    """How old a state is on the clock that stamped it."""
-    return now_s - state.time_s
-
-
 def finite_vector(force_n: np.ndarray) -> np.ndarray:
     """(3,) float copy; raises DeviceError where it is no 3-vector (values that are not finite pass)."""
     vector = np.array(force_n, dtype=float)

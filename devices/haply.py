@@ -28,7 +28,7 @@ from palpate.devices.codecs import haply as codec
 from palpate.devices.io_thread import ForcefulDevice, Reading, found
 from palpate.mechanics.errors import DeviceError
 from palpate.mechanics.extras import install_words
-from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.options import Ranged, option
 
 SPEC = DeviceSpec(
     name="haply",
@@ -55,7 +55,7 @@ _NO_SERVICE = (
 
 
 @dataclass(frozen=True)
-class HaplyOptions:
+class HaplyOptions(Ranged):
     """Where the service is and which device of it."""
 
     uri: str = option("ws://localhost:10001", "state and command socket", flag="--haply-uri")
@@ -74,9 +74,6 @@ class HaplyOptions:
         "the service's mount (3.5 or later): origin in the workspace's middle; '' keeps the one that it has",
         flag="--haply-preset",
     )
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
 
 
 class HaplyWire:

@@ -160,16 +160,11 @@ class ThreadedDevice(OpenInWith):
 
     def _flagged(self, fault: str) -> TipState:
         """The last state with the device's flags of now; its time, sequence and place stay what they were."""
-        last = self._state
-        return TipState(
-            last.time_s,
-            last.sequence,
-            last.position_m,
-            ZERO,
-            last.quaternion,
-            last.buttons,
+        return replace(
+            self._state,
+            velocity_m_per_s=ZERO,
             connected=self._connected,
-            calibrated=last.calibrated and self._connected,
+            calibrated=self._state.calibrated and self._connected,
             force_enabled=self._force_enabled,
             fault=fault,
         )

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from palpate.mechanics.bounds import FARTHEST_M, FASTEST_M_PER_S
 from palpate.mechanics.errors import OptionError
-from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.options import Ranged, option
 from palpate.mechanics.tip_state import TipState
 
 LONGEST_RATE_STEP_S = 0.05
@@ -25,7 +25,7 @@ _AXES = {"x": 0, "y": 1, "z": 2}
 
 
 @dataclass(frozen=True)
-class MapperOptions:
+class MapperOptions(Ranged):
     """How a device's motion becomes the tip's. Sign and axis come from a right-handed triple."""
 
     axes: str = option("x,y,z", "device axes, with signs, that give the scene's x,y,z: for example x,-z,y")
@@ -35,9 +35,6 @@ class MapperOptions:
     reach_m: float = option(
         0.25, "how far from the scene's centre a rate device moves", unit="m", low=0.001, high=10.0
     )
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
 
 
 def axis_matrix(axes: str) -> np.ndarray:

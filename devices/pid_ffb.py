@@ -20,7 +20,7 @@ from palpate.devices.codecs.pid import PidLayout
 from palpate.devices.hid_port import HidPort, enumerate_devices, load, opened, permitted
 from palpate.devices.io_thread import ForcefulDevice, Reading
 from palpate.mechanics.errors import DeviceError
-from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.options import Ranged, option
 
 SPEC = DeviceSpec(
     name="pid-ffb",
@@ -44,7 +44,7 @@ LONGEST_GAP_S = 0.1
 
 
 @dataclass(frozen=True)
-class PidOptions:
+class PidOptions(Ranged):
     """What turns shares of full scale into metres and newtons at the handle."""
 
     full_scale_n: float = option(
@@ -54,9 +54,6 @@ class PidOptions:
         0.05, "travel of the handle from the middle to an end", unit="m", flag="--ffb-stroke", low=0.001
     )
     device_path: str = option("", "which device, as 'palpate devices' lists it", flag="--ffb-path")
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
 
 
 class PidWire:

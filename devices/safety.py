@@ -23,7 +23,7 @@ from palpate.devices.base import DeviceSpec
 from palpate.mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.kernels import inner, kernel
-from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.options import Ranged, option
 
 OFF, NOT_FINITE, STALE, OUTSIDE, DISCONNECTED, UNCALIBRATED, FAULT, OVER_SPEED, JUMP, CLOCK = (
     1 << k for k in range(10)
@@ -59,7 +59,7 @@ def reason_words(reasons: int) -> str:
 
 
 @dataclass(frozen=True)
-class SafetyOptions:
+class SafetyOptions(Ranged):
     """What the filter allows; the device's own specification is never exceeded."""
 
     max_force_n: float | None = option(
@@ -104,9 +104,6 @@ class SafetyOptions:
     workspace_radius_m: float | None = option(
         None, "no force outside this radius; None: the device's own", unit="m", low=0.001, high=10.0
     )
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
 
 
 class SafetyParameters(NamedTuple):

@@ -24,7 +24,7 @@ from palpate.devices.base import (
 from palpate.devices.impedance import HandImpedance, follow
 from palpate.devices.intention import FreeExploration, Intention
 from palpate.mechanics.errors import DeviceError
-from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.options import Ranged, option
 from palpate.mechanics.tip_state import TipState
 
 SPEC = DeviceSpec(
@@ -49,16 +49,13 @@ TREMOR_HZ = (8.0, 9.7, 11.3)
 
 
 @dataclass(frozen=True)
-class SimulatedOptions:
+class SimulatedOptions(Ranged):
     """The simulated hand. Impedance values are of a light grasp; tremor is physiological, rms an axis."""
 
     mass_kg: float = option(0.15, "moving mass of hand and tool", unit="kg", flag="--hand-mass", low=0.001)
     damping_n_s_per_m: float = option(12.0, "the grasp's damping", unit="N s/m", flag="--hand-damping")
     stiffness_n_per_m: float = option(600.0, "the grasp's stiffness", unit="N/m", flag="--hand-stiffness")
     tremor_m: float = option(2e-5, "tremor, rms per axis", unit="m", flag="--tremor", high=0.01)
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
 
 
 class SimulatedHand(OpenInWith):

@@ -250,19 +250,3 @@ class Bound:
     ratio = OwnError(0.25, "1", "95 %: Poisson's ratio below the usual one", "place", _BOUND)
     slip = OwnError(0.05, "1", "95 %: depth, in tip radii, of a tip without friction", "place", _BOUND)
     slippery = OwnError(0.15, "1", "coefficient of friction over which `slip` fades", "place", _BOUND)
-
-
-ERRORS = (
-    FirstTouch, Stiffness, Repeats, Level, DepthLaw, FiniteStrain, Direction, Slip, Latency, Unnamed,
-    Smallest, Bound,
-)  # fmt: skip
-
-
-def entries() -> dict[str, OwnError]:
-    """Every entry by its name, such as 'FirstTouch.diagnosis'."""
-    return {
-        f"{error.__name__}.{name}": entry
-        for error in ERRORS
-        for name, entry in vars(error).items()
-        if isinstance(entry, OwnError)
-    }

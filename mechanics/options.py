@@ -125,6 +125,13 @@ def check_ranges(options: Any) -> None:
             check_range(field, getattr(options, field.name))
 
 
+class Ranged:
+    """Base of options dataclasses that are never outside their ranges (`check_ranges`)."""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
+
+
 def loosened(options: Any) -> tuple[str, ...]:
     """What protects less than its default does, in plain words with the flag that set it."""
     words = []

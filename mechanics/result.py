@@ -6,9 +6,14 @@ asks it. So this module, and every package whose types derive from `Result`, imp
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Protocol
+
+import numpy as np
 
 from palpate.mechanics.errors import OptionError
 
@@ -124,3 +129,40 @@ def _plain_lines(result: Result) -> list[str]:
     values = {name: getattr(result, name) for name in names}
     said = [f"{name} = {value}" for name, value in values.items() if isinstance(value, _PLAIN)]
     return [type(result).__name__ + (f": {', '.join(said)}" if said else "")]
+
+
+def plain(value: Any) -> Any:
+    """A value that JSON can hold: arrays as lists, numbers that are not finite as null; of a dataclass what
+    its `as_json` gives, else its fields, each by the name in its metadata ("json") or its own."""
+    if is_dataclass(value) and not isinstance(value, type):
+        if hasattr(value, "as_json"):
+            return plain(value.as_json())
+        named = {f.metadata.get("json", f.name): getattr(value, f.name) for f in fields(value)}
+        return plain(named)
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
+
+
+Key = str | tuple[str, Callable[[Any], Any]] | Callable[[Any], Mapping[str, Any]]
+"""Of JSON: a field's name, 'key=path.of.fields', (key, function), or a function that gives several."""
+
+
+def figures_of(result: Any, keys: Iterable[Key]) -> dict[str, Any]:
+    """The JSON of a result."""
+    found: dict[str, Any] = {}
+    for key in keys:
+        if isinstance(key, str):
+            name, _, path = key.partition("=")
+            found[name] = attrgetter(path or name)(result)
+        elif isinstance(key, tuple):
+            found[key[0]] = key[1](result)
+        else:
+            found |= key(result)
+    return plain(found)

@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.shape.nearest import facings
+
 
 def stable_stiffness_n_per_m(
     max_stiffness_n_per_m: float, rate_hz: float = 1000.0, delay_ticks: float = 0.0
@@ -27,6 +29,10 @@ def stable_stiffness_n_per_m(
     return max_stiffness_n_per_m / slower**2
 
 
+_PLACES, _DEEPEST_M = 100, 0.02
+"""Of the presses that seek the stiffest."""
+
+
 def series_compliance_m_per_n(stiffest_n_per_m: float, limit_n_per_m: float) -> float:
     """The softest coupling that the limit demands, m/N; 0 where the object is softer than the limit."""
     if limit_n_per_m <= 0.0 or stiffest_n_per_m <= limit_n_per_m:
@@ -34,19 +40,15 @@ def series_compliance_m_per_n(stiffest_n_per_m: float, limit_n_per_m: float) -> 
     return 1.0 / limit_n_per_m - 1.0 / stiffest_n_per_m
 
 
-def stiffest_n_per_m(
-    renderer: Any, max_force_n: float, *, places: int = 100, deepest_m: float = 0.02
-) -> float:
+def stiffest_n_per_m(renderer: Any, max_force_n: float) -> float:
     """The greatest normal stiffness felt anywhere below `max_force_n`, by presses all over the surface."""
     points, triangles = renderer.surface
-    corners = points[triangles[:, :3]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    corners, (_, normals) = points[triangles[:, :3]], facings(points, triangles)
     greatest = 0.0
-    for k in np.unique(np.linspace(0, len(triangles) - 1, places).astype(int)):
+    for k in np.unique(np.linspace(0, len(triangles) - 1, _PLACES).astype(int)):
         state = renderer.start()
         radius = float(state.radii_m[0])
-        for depth in np.linspace(-0.001, deepest_m, 85):
+        for depth in np.linspace(-0.001, _DEEPEST_M, 85):
             tip = corners[k].mean(axis=0) + (radius - depth) * normals[k]
             state, forces = renderer.step(state, tip[None])
             if np.linalg.norm(forces[0]) > max_force_n:

@@ -29,7 +29,7 @@ import numpy as np
 from palpate.mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.kernels import inner, kernel
-from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.options import Ranged, option
 
 LONGEST_DELAY_TICKS = 64
 MOST_OWED_J = 2e-3
@@ -40,7 +40,7 @@ AFFORDED_TICKS = 1.5
 
 
 @dataclass(frozen=True)
-class PassivityOptions:
+class PassivityOptions(Ranged):
     """How strictly energy is kept, and what it may cost."""
 
     passivity: bool = option(True, "time-domain passivity observer and controller")
@@ -72,9 +72,6 @@ class PassivityOptions:
         high=0.01,
         looser="higher",
     )
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
 
 
 class PassivityParameters(NamedTuple):

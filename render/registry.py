@@ -66,9 +66,6 @@ def create(
     known = {**RENDERERS, **_SIMULATORS}
     if name not in known:
         raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(known)}")
+    kept = {"on_demand": on_demand, "coarse": coarse} if name == "fem" else {}
     module = importlib.import_module(known[name])
-    if on_demand and hasattr(module, "create_on_demand"):
-        return module.create_on_demand(model, options or RenderOptions(), progress)
-    if coarse and hasattr(module, "create_coarse"):
-        return module.create_coarse(model, options or RenderOptions(), progress)
-    return module.create(name, model, options or RenderOptions(), progress)
+    return module.create(name, model, options or RenderOptions(), progress, **kept)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from palpate.mechanics.kernels import inner, kernel
-from palpate.mechanics.options import check_ranges, option
+from palpate.mechanics.options import Ranged, option
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -22,7 +22,7 @@ CREEP_M_PER_S = 0.005
 
 
 @dataclass(frozen=True)
-class SupportOptions:
+class SupportOptions(Ranged):
     """What the plane beside the object feels like, in every command that renders a model."""
 
     support: bool = option(True, "the support is felt as a rigid plane around the object")
@@ -33,9 +33,6 @@ class SupportOptions:
         2.0, "the support's damping", unit="N s/m", high=100.0, looser="higher"
     )
     support_friction: float = option(0.2, "friction on the support", high=10.0)
-
-    def __post_init__(self) -> None:
-        check_ranges(self)
 
 
 class SupportParameters(NamedTuple):

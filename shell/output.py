@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
-import math
 import shutil
 import sys
 import threading
-from pathlib import Path
-from typing import Any, Self
+from contextlib import AbstractContextManager
+from typing import Any
 
 from palpate.mechanics.disk.writing import JSON, atomic_file
 from palpate.mechanics.progress import Remaining
+from palpate.mechanics.result import plain
 
 
 class Output:
@@ -43,27 +42,6 @@ def emit_json(value: Any, destination: str | None) -> None:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 
-def plain(value: Any) -> Any:
-    """A value that JSON can hold: arrays as lists, numbers that are not finite as null; of a dataclass what
-    its `as_json` gives, else its fields, each by the name in its metadata ("json") or its own."""
-    import numpy as np
-
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        if hasattr(value, "as_json"):
-            return plain(value.as_json())
-        named = {f.metadata.get("json", f.name): getattr(value, f.name) for f in dataclasses.fields(value)}
-        return plain(named)
-    if isinstance(value, dict) or hasattr(value, "items"):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [plain(v) for v in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value
-
-
 _REDRAWN_S, _SHORT_S = 1.0, 5.0
 
 
@@ -72,7 +50,7 @@ def progress_bar(label: str) -> Bar:
     return Bar(label)
 
 
-class Bar:
+class Bar(AbstractContextManager["Bar"]):
     """The one display of every wait: on a terminal a bar with the stage and what is left of it, which goes on
     while a stage tells of nothing; elsewhere nothing, so that standard error holds errors alone."""
 
@@ -126,9 +104,6 @@ class Bar:
         if self._terminal:
             self._thread.join()
         self._bar.close()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -132,9 +132,9 @@ def table_words(solved: float, error_n: float, depth_m: float) -> str:
     return f"{words}; a press of {mm(depth_m)} is within {1e3 * error_n:.2g} mN (95 % of places)"
 
 
-def with_unit(value: float, unit: str, scale: float = 1.0, digits: int = 4) -> str:
+def with_unit(value: float, unit: str, scale: float = 1.0) -> str:
     """A number with its unit for people: `with_unit(0.0123, "mm", 1e3)` is '12.3 mm'."""
-    return f"{value * scale:.{digits}g} {unit}"
+    return f"{value * scale:.4g} {unit}"
 
 
 def mm(metres: float, form: str = ".3g") -> str:

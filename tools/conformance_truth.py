@@ -20,7 +20,6 @@ from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.scenes.conformance.cases import (
     BESIDE_M,
     BODIES,
-    LAWS,
     POISSON,
     SHARES,
     SLIDE,
@@ -84,7 +83,7 @@ def solve(body: Body) -> dict[str, np.ndarray]:
     along /= np.linalg.norm(along)
     depths, way = SHARES * body.depth_m, (STUCK * body.depth_m * along)[None]
     forces = []
-    for law in LAWS:
+    for law in ("linear", "neo-hookean"):  # one solid where strains are small
         options = PressOptions(law=law, coupled=True, finest=0.8)
         solver = PressSolver(
             mesh, surface, young_modulus_pa=YOUNG_PA, poisson_ratio=POISSON, tip_radius_m=TIP_M,

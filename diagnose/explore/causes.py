@@ -101,13 +101,12 @@ def prior_of(names: Sequence[str]) -> np.ndarray:
     return np.array([0.5 if n == NONE else each for n in names])
 
 
-def causes_of(estimate: ExplorationEstimate, least_n: float | None = None) -> tuple[Causes, Weighing] | None:
+def causes_of(estimate: ExplorationEstimate) -> tuple[Causes, Weighing] | None:
     """None with fewer presses than LEAST_PRESSES, or without a surface."""
     weighing = weigh(estimate)
     if weighing is None:
         return None
-    least = least_n or least_that_matters(weighing.forward)
-    return judge(weighing, least), weighing
+    return judge(weighing, least_that_matters(weighing.forward)), weighing
 
 
 def least_that_matters(forward: Forward) -> float:

@@ -47,8 +47,9 @@ class Explorer:
     """A running exploration: `add` what was felt, read `state`, ask `suggest`.
 
     instrument: what is known of the device. poisson_ratio: of the object. order: None goes where the progress
-    is greatest; another order of touching stands in for it where guidance is measured. Segments that were
-    added stay, whatever happens after: `recording` and `save` hold them all.
+    is greatest; another order of touching stands in for it where guidance is measured. estimate: shape,
+    sites and modulus behind `state`. Segments that were added stay, whatever happens after: `recording` and
+    `save` hold them all.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class Explorer:
         self.segments: list[Segment] = []
         self._nu, self._seed = poisson_ratio, seed
         self._order, self._rng = order, np.random.default_rng([seed, 61])
-        self._estimate = ExplorationEstimate()
+        self.estimate = ExplorationEstimate()
         self._base: Boundary | None = None
         self._heights = np.zeros(0)
         self._trouble, self._air_hides = "", False
@@ -108,11 +109,6 @@ class Explorer:
         """All that was felt, as a recording. Raises RecordingError where that is nothing."""
         return join(self.instrument, self.segments)
 
-    @property
-    def estimate(self) -> ExplorationEstimate:
-        """Shape, sites and modulus behind `state`."""
-        return self._estimate
-
     def save(self, path: str | Path) -> Path:
         """Write what was felt so far; an earlier file stays whole until the new one is. Returns its path."""
         return write_recording(path, self.recording)
@@ -130,12 +126,12 @@ class Explorer:
     def bring_up_to_date(self) -> None:
         """Update the estimate with all segments, where they were put down without `add`."""
         try:
-            if self._estimate.surface is None:
+            if self.estimate.surface is None:
                 self._trace_only()
             if self._made >= LEAST_PRESSES:
-                before = self._estimate
-                self._estimate = updated(
-                    self.recording, self._estimate, self._nu, self._seed, within_m=self.goals.surface_within_m
+                before = self.estimate
+                self.estimate = updated(
+                    self.recording, self.estimate, self._nu, self._seed, within_m=self.goals.surface_within_m
                 )
                 self._tested(before)
                 self._weigh()
@@ -147,9 +143,9 @@ class Explorer:
 
     def _tested(self, before: ExplorationEstimate) -> None:
         """Each new touch tests the surface as it was: by how many of its standard deviations it was off."""
-        if before.surface is None or before.exploration is None or self._estimate.exploration is None:
+        if before.surface is None or before.exploration is None or self.estimate.exploration is None:
             return
-        surface, presses = before.surface, self._estimate.exploration.presses
+        surface, presses = before.surface, self.estimate.exploration.presses
         new = presses.onset_s > before.exploration.presses.onset_s[-1] + NEW_S
         if not new.any():
             return
@@ -169,14 +165,14 @@ class Explorer:
         if self.goals.cause_at is None:
             return
         clock = Clock()
-        self._causes = causes_of(self._estimate)
+        self._causes = causes_of(self.estimate)
         clock.lap("causes")
         self._beside = None
         if self._causes is not None:
             causes, weighing = self._causes
-            self._beside = modulus_beside(self._estimate, weighing, causes, self._seed)
+            self._beside = modulus_beside(self.estimate, weighing, causes, self._seed)
         clock.lap("modulus beside causes")
-        self._estimate.seconds.update(clock.laps)
+        self.estimate.seconds.update(clock.laps)
 
     @property
     def _made(self) -> int:
@@ -191,7 +187,7 @@ class Explorer:
     @property
     def state(self) -> ExplorationState:
         """What is known now."""
-        e = self._estimate
+        e = self.estimate
         nan = float("nan")
         modulus, interval = (nan, (nan, nan)) if e.fit is None else (e.fit.modulus_pa, e.fit.ci95_pa)
         modulus, interval = self._beside or (modulus, interval)
@@ -238,14 +234,14 @@ class Explorer:
                 base=self._base,
                 heights=self._heights,
                 air_hides=self._air_hides,
-                estimate=self._estimate,
+                estimate=self.estimate,
                 causes=self._causes,
                 here=self.segments[-1].position[-1] if self.segments else np.zeros(3),
                 asked=np.array(self._asked).reshape(-1, 3),
                 choose=choose,
             )
         )
-        if found.point is not None and self._estimate.surface is not None:
+        if found.point is not None and self.estimate.surface is not None:
             self._asked.append(found.point)
         self._last = found
         return found
@@ -254,5 +250,5 @@ class Explorer:
         """What it came to so far. path: of the recording that holds it; truth: of a phantom."""
         last = self._last or self.suggest()
         return Explored(
-            path, tuple(self._steps), self.state, last, self.goals, self._estimate, truth=truth or {}
+            path, tuple(self._steps), self.state, last, self.goals, self.estimate, truth=truth or {}
         )

@@ -10,7 +10,6 @@ import numpy as np
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.presses.table import Presses
 
-DOMAIN = "numerics"
 LEAST_SHARE = 0.1
 """Of a press's greatest force, below which a sample says nothing of whether contact was kept."""
 
@@ -43,7 +42,7 @@ class SampleEvidence:
     keys: dict[str, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class NumericalEffect(Effect):
     """A flaw of a simulator. advice: what mends it, in words that fit any simulator.
 
@@ -51,6 +50,7 @@ class NumericalEffect(Effect):
     fitted. None: it is searched for, as physical effects are.
     """
 
+    domain: str = "numerics"
     advice: str = ""
     see: Callable[[Signal], SampleEvidence] | None = None
 

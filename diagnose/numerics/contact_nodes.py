@@ -7,7 +7,7 @@ by nodes alone is met late, between them, by a share of a0^2 / R.
 
 import numpy as np
 
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
@@ -34,7 +34,6 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
 
 EFFECT = NumericalEffect(
     name="contact_nodes",
-    domain=DOMAIN,
     scope=Scope.EVERYWHERE,
     words="the tip rests on few nodes: a patch that does not shrink as the press gets lighter",
     plain_words="the mesh is too coarse under the tip: it is pressed by single corner points",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
@@ -15,7 +15,6 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
 
 EFFECT = NumericalEffect(
     name="contact_offset",
-    domain=DOMAIN,
     scope=Scope.PRESS,
     words="the surface stands off (a margin, a skin, a particle's radius), or is met late",
     plain_words="the simulated surface is met before, or after, it is there",

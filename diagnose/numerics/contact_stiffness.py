@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
@@ -43,7 +43,6 @@ def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[
 
 EFFECT = NumericalEffect(
     name="contact_stiffness",
-    domain=DOMAIN,
     scope=Scope.EVERYWHERE,
     words="the contact gives: springs in series that the object does not have",
     plain_words="the simulated tip sinks into the surface before it is pushed back, as if on a spring",

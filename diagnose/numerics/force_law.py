@@ -5,14 +5,12 @@ penalty with the depth itself. A solid's own force goes with the power 1.5, so s
 |F| (|F| / F0)^(p / 1.5 - 1); its level, at the force F0 of a median press, is a modulus of another name.
 """
 
-from typing import Any
-
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.disk.schema import FileKey
-from palpate.mechanics.effects.base import Keys, Parameter, Scope
+from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import LATE, ForwardSettings, TouchedScene
 from palpate.mechanics.quantities import number_words
@@ -42,17 +40,8 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
     settings.read(LATE - 1, other_power)
 
 
-def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
-    return {"power": float(values[0]), "ratio": float(np.exp(values[1]))}
-
-
-def _words(keys: Keys) -> str:
-    return f"power {number_words(keys['power'])} of the depth instead of {HERTZ}"
-
-
 EFFECT = NumericalEffect(
     name="force_law",
-    domain=DOMAIN,
     scope=Scope.EVERYWHERE,
     words="the force goes with another power of the depth than a solid's 1.5",
     plain_words="the simulated force grows with depth in another way than that of a solid, as pressure "
@@ -62,8 +51,11 @@ EFFECT = NumericalEffect(
         Parameter("log_ratio", "1", -2.5, 2.5, 0.0, (0.0, 0.0, 0.0), 0.01, 0.5),
     ),
     keys={"power": FileKey(low=0.1, high=10.0, required=True), "ratio": FileKey(low=1e-3, high=1e3)},
-    report=_report,
-    keys_in_words=_words,
+    report=lambda values, scene, modulus_pa: {
+        "power": float(values[0]),
+        "ratio": float(np.exp(values[1])),
+    },
+    keys_in_words=lambda keys: f"power {number_words(keys['power'])} of the depth instead of {HERTZ}",
     change=_change,
     advice="take a contact that solves the solid (finite elements under the tip) instead of a pressure field "
     "or springs a node; a contact modulus fits one depth alone",

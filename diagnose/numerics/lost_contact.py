@@ -6,7 +6,7 @@ import dataclasses
 import numpy as np
 from scipy.ndimage import grey_closing
 
-from palpate.diagnosis.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, SampleEvidence, Signal
+from palpate.diagnosis.numerics.base import LEAST_SHARE, NumericalEffect, SampleEvidence, Signal
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Role, Scope, no_keys
 
@@ -55,7 +55,6 @@ def _see(signal: Signal) -> SampleEvidence:
 
 EFFECT = NumericalEffect(
     name="lost_contact",
-    domain=DOMAIN,
     scope=Scope.READING,
     words="contact flickers: samples without force in the midst of a press",
     plain_words="the simulated tip loses the surface again and again",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
@@ -50,7 +50,6 @@ def _words(keys: Keys) -> str:
 
 EFFECT = NumericalEffect(
     name="mesh_stiffness",
-    domain=DOMAIN,
     scope=Scope.EVERYWHERE,
     words="the mesh is too stiff (coarse or locking elements), whatever depth and rate",
     plain_words="the simulated object itself is too stiff or too soft, as coarse or locking meshes are",

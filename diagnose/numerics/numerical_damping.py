@@ -3,7 +3,7 @@
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.settings import WEIGHED, ForwardSettings, TouchedScene
@@ -36,7 +36,6 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
 
 EFFECT = NumericalEffect(
     name="numerical_damping",
-    domain=DOMAIN,
     scope=Scope.TIME,
     words="force that grows with the tip's speed, which no parameter states",
     plain_words="the simulated object resists fast presses more than slow ones",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
@@ -16,7 +16,6 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
 
 EFFECT = NumericalEffect(
     name="numerical_drift",
-    domain=DOMAIN,
     scope=Scope.PRESS,
     words="the simulated body wanders with time",
     plain_words="the simulated object creeps away from where it stands",

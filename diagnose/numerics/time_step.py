@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.diagnosis.numerics.base import DOMAIN, NumericalEffect
+from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.settings import LATE, ForwardSettings, TouchedScene
@@ -16,7 +16,6 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
 
 EFFECT = NumericalEffect(
     name="time_step",
-    domain=DOMAIN,
     scope=Scope.TIME,
     words="the force comes late, by the simulator's steps",
     plain_words="the simulated force answers where the tip was a moment ago",

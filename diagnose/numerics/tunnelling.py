@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from palpate.diagnosis.numerics.base import DOMAIN, LEAST_SHARE, NumericalEffect, SampleEvidence, Signal
+from palpate.diagnosis.numerics.base import LEAST_SHARE, NumericalEffect, SampleEvidence, Signal
 from palpate.diagnosis.numerics.lost_contact import LONGEST_S
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Parameter, Role, Scope, no_keys
@@ -93,7 +93,6 @@ def _see(signal: Signal) -> SampleEvidence:
 
 EFFECT = NumericalEffect(
     name="tunnelling",
-    domain=DOMAIN,
     scope=Scope.READING,
     words="the tip passes through the surface: inside, and pushed back less, not at all, or pulled in",
     plain_words="the simulated tip falls through the surface and is not pushed back any more",

@@ -21,7 +21,7 @@ from palpate.diagnosis.search.rivals import Explanation
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry, answers_json
 from palpate.diagnosis.verdict.where import Where
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.result import Result
+from palpate.mechanics.result import Key, Result, figures_of
 
 _MEANT = {
     "stated_modulus": ("Young's modulus", "Pa"),
@@ -108,11 +108,7 @@ class Part:
 
     gap_n: float
     share: float
-    names: tuple[str, ...] = ()
-
-    def as_json(self) -> dict[str, Any]:
-        """The contract's keys, and the names."""
-        return {"gap_n": self.gap_n, "share": self.share, "effects": list(self.names)}
+    names: tuple[str, ...] = field(default=(), metadata={"json": "effects"})
 
 
 @dataclass(frozen=True)
@@ -124,10 +120,6 @@ class Mended:
     gap_n: float
     effects: tuple[str, ...]
 
-    def as_json(self) -> dict[str, Any]:
-        """Its fields."""
-        return {"settings": self.settings, "gap_n": self.gap_n, "effects": list(self.effects)}
-
 
 @dataclass(frozen=True)
 class OwnFlaws:
@@ -138,10 +130,6 @@ class OwnFlaws:
     candidates: tuple[str, ...]
     off_n: float
 
-    def as_json(self) -> dict[str, Any]:
-        """Its fields."""
-        return {"effects": list(self.effects), "candidates": list(self.candidates), "off_n": self.off_n}
-
 
 @dataclass(frozen=True)
 class MadeUp:
@@ -150,14 +138,6 @@ class MadeUp:
     effects: tuple[str, str]
     alone_n: tuple[float, float]
     together_n: float
-
-    def as_json(self) -> dict[str, Any]:
-        """Its fields."""
-        return {
-            "effects": list(self.effects),
-            "alone_n": list(self.alone_n),
-            "together_n": self.together_n,
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -213,20 +193,22 @@ class SimulatedGap(Result):
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""
-        return {
-            **answers_json(self, self.reality.next_touch),
-            "simulator": self.simulator.as_json(),
-            "parts": {name: self.parts[name].as_json() for name in ("reality", "parameters", "numerics")},
-            "unexplained": self.unexplained,
-            "unexplained_n": self.unexplained_n,
-            "unexplained_of": {"noise": self.noise_share, "first_touches": self.touch_share},
-            "advice": list(self.advice),
-            "notes": list(self.notes),
-            "reasons": list(self.reasons),
-            "gap_after_measured_n": None if self.mended is None else self.mended.gap_n,
-            "gap_without_numerics_n": self.without_numerics_n,
-            "mended": None if self.mended is None else self.mended.as_json(),
-            "own": None if self.own is None else self.own.as_json(),
-            "made_up": [each.as_json() for each in self.made_up],
-            "ideal": self.reality.as_json(),
-        }
+        return {**answers_json(self, self.reality.next_touch), **figures_of(self, _KEYS)}
+
+
+_KEYS: tuple[Key, ...] = (
+    "simulator",
+    ("parts", lambda gap: {name: gap.parts[name] for name in ("reality", "parameters", "numerics")}),
+    "unexplained",
+    "unexplained_n",
+    ("unexplained_of", lambda gap: {"noise": gap.noise_share, "first_touches": gap.touch_share}),
+    "advice",
+    "notes",
+    "reasons",
+    ("gap_after_measured_n", lambda gap: None if gap.mended is None else gap.mended.gap_n),
+    "gap_without_numerics_n=without_numerics_n",
+    "mended",
+    "own",
+    "made_up",
+    "ideal=reality",
+)

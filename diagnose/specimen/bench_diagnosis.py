@@ -33,10 +33,10 @@ _TIMES_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0)
 _RIDGES = np.geomspace(1e-8, 1e1, 10)
 
 
-def held_out_rivals(presses: Presses, folds: int = FOLDS) -> dict[str, np.ndarray]:
+def held_out_rivals(presses: Presses) -> dict[str, np.ndarray]:
     """(n,) N for every row: the held-out normal force by each rival. presses: thinned, net of free air; every
     press is a unit."""
-    fold = np.arange(len(presses)) % min(folds, len(presses))
+    fold = np.arange(len(presses)) % min(FOLDS, len(presses))
     depth, rate = np.maximum(presses.depth, 0.0), presses.speed
     push, press = presses.push, presses.press
     memory = _features(presses)

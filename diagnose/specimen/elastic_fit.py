@@ -332,16 +332,14 @@ def _slopes(each: _Tried, variance: float) -> tuple[np.ndarray, np.ndarray] | tu
     return unit * values, unit * np.sqrt(square)
 
 
-def _quantiles(
-    middle: np.ndarray, error: np.ndarray, weight: np.ndarray, at: Sequence[float] = (0.025, 0.5, 0.975)
-) -> list[float]:
-    """Of a mixture of normal distributions."""
+def _quantiles(middle: np.ndarray, error: np.ndarray, weight: np.ndarray) -> list[float]:
+    """Median and 95 % interval, (low, middle, high), of a mixture of normal distributions."""
     kept = weight > 1e-5 * weight.max()
     middle, weight = middle[kept], weight[kept]
     error = np.maximum(error[kept], 1e-9 * np.abs(middle) + 1e-300)
     ends = float((middle - 5 * error).min()), float((middle + 5 * error).max())
     found = []
-    for each in at:
+    for each in (0.025, 0.5, 0.975):
         low, high = ends
         for _ in range(50):
             half = 0.5 * (low + high)

@@ -63,12 +63,9 @@ MACHINE_TAKES_ALL = "the machine's stiffness, which takes nearly all of the trav
 """What a modulus that is the machine's is said to rest on."""
 
 
-def as_read(modulus_pa: float, interval: tuple[float, float], log_half: float = 0.0) -> tuple[float, float]:
-    """Pa, 95 %, about a modulus: an interval, what else its logarithm is known by, and how truly forces and
-    travels are read at all."""
-    low, high = (
-        float(np.sqrt(np.log(end / modulus_pa) ** 2 + log_half**2 + (2 * _READ) ** 2)) for end in interval
-    )
+def as_read(modulus_pa: float, interval: tuple[float, float]) -> tuple[float, float]:
+    """Pa, 95 %, about a modulus: an interval, and how truly forces and travels are read at all."""
+    low, high = (float(np.sqrt(np.log(end / modulus_pa) ** 2 + (2 * _READ) ** 2)) for end in interval)
     return modulus_pa * float(np.exp(-low)), modulus_pa * float(np.exp(high))
 
 

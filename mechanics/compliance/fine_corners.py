@@ -29,7 +29,7 @@ from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.model.material import Ball
 from palpate.mechanics.plausible import USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.shape.nearest import closest
+from palpate.mechanics.shape.nearest import closest, facings
 from palpate.mechanics.shape.refine import typical_edge
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 
@@ -163,9 +163,7 @@ class EdgeMiddles:
             (np.ones(triangles.size), (triangles.ravel(), np.repeat(np.arange(len(triangles)), 3)))
         )
         self._around = (links.T @ links).tocsr()  # triangles that share a corner
-        corners = points[triangles]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        _, self._normals = facings(points, triangles)
 
     def corners(self, triangle: int) -> np.ndarray:
         """(k,) the points whose values count for a triangle, its own among them."""

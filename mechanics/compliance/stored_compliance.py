@@ -7,7 +7,6 @@ interpolates (mechanics.compliance.surface_compliance).
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -21,43 +20,30 @@ from palpate.mechanics.disk.store import content_key, load_or_build, read_arrays
 from palpate.mechanics.effects.hold import base_hold
 from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.elastic.solver import Solver
-from palpate.mechanics.errors import CacheError, OptionError
+from palpate.mechanics.errors import CacheError
 from palpate.mechanics.model.material import with_balls
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.options import option
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
 
-FORMS = ("auto", "dense", "low-rank")
+LARGEST_DENSE_BYTES = 1.5e8
+"""Of a dense table: a larger surface gets one of low rank (surface_compliance)."""
+LOW_RANK_ERROR = 0.005
+"""Relative, of such a table."""
 
 
-@dataclass(frozen=True)
-class ComplianceOptions:
-    """In which form `load_or_condense` keeps how a touch at one place moves another."""
-
-    form: str = option("auto", "dense, low-rank, or auto: low-rank for a large surface", choices=FORMS)
-    largest_dense_bytes: float = option(1.5e8, "dense table beyond which auto takes low-rank", unit="bytes")
-    low_rank_error: float = option(0.005, "relative error of a low-rank table")
-
-    def __post_init__(self) -> None:
-        if self.form not in FORMS:
-            raise OptionError(f"form is '{self.form}'; allowed are {', '.join(FORMS)}")
-        if not 1e-6 < self.low_rank_error < 0.2:
-            raise OptionError(f"low_rank_error is {self.low_rank_error}; it must lie between 1e-6 and 0.2")
-
-    def error_of(self, mesh: TetMesh) -> float | None:
-        """The low-rank error for a mesh, None where its table is to be dense."""
-        corners = len(np.unique(mesh.touchable_surface[:, :3]))
-        large = 36.0 * corners**2 > self.largest_dense_bytes
-        dense = self.form == "dense" or (self.form == "auto" and not large)
-        return None if dense else self.low_rank_error
+def low_rank_error(mesh: TetMesh) -> float | None:
+    """Of the table of a mesh; None where that is dense."""
+    corners = len(np.unique(mesh.touchable_surface[:, :3]))
+    return LOW_RANK_ERROR if 36.0 * corners**2 > LARGEST_DENSE_BYTES else None
 
 
-def compliance_key(model: Model, options: ComplianceOptions | None = None) -> str:
-    """64 hexadecimal digits over everything that the numbers of `load_or_condense` depend on."""
+def compliance_key(model: Model, *, dense: bool = False) -> str:
+    """64 hexadecimal digits over everything that the numbers of `load_or_condense` depend on; dense: of a
+    table that is so whatever its size."""
     material, hold = model.material, _hold(model)
     balls = tuple(material.inclusions.values())
-    error = (options or ComplianceOptions()).error_of(model.mesh)
+    error = None if dense else low_rank_error(model.mesh)
     return content_key(
         "surface compliance 8",
         model.mesh.points,
@@ -83,20 +69,17 @@ def _hold(model: Model) -> BaseHold | None:
     return base_hold(model.effects, model.support.normal, model.material.young_modulus_pa)
 
 
-def load_or_condense(
-    model: Model, progress: Progress = silent, *, options: ComplianceOptions | None = None
-) -> SurfaceCompliance:
+def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompliance:
     """The servo's compliance of a model: from the cache in its folder, or computed and stored there.
 
     The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model,
     a damaged or a truncated file is rebuilt. Of the model's effects those of the base count
     (mechanics.elastic.held_base). That of a model that was never written stays in memory until the next
-    one's. A folder that cannot be written keeps nothing. A large surface is compressed (ComplianceOptions).
+    one's. A folder that cannot be written keeps nothing. A large surface is compressed.
     """
     material = model.material
     hold = _hold(model)
-    error = (options or ComplianceOptions()).error_of(model.mesh)
-    key = compliance_key(model, options)
+    key = compliance_key(model)
 
     def build() -> dict[str, np.ndarray]:
         made = surface_compliance(
@@ -105,7 +88,7 @@ def load_or_condense(
             model.ratio_without_balls,
             balls=tuple(material.inclusions.values()),
             hold=hold,
-            low_rank_error=error,
+            low_rank_error=low_rank_error(model.mesh),
             tip_radius_m=model.tool.tip_radius_m,
             solved=kept_places(model),
             progress=progress,
@@ -167,7 +150,7 @@ def kept_places(model: Model) -> OnDemandCompliance | None:
 
 
 def _places_of(model: Model) -> tuple[str, Path | None]:
-    key = content_key("solved places 3", compliance_key(model, ComplianceOptions("dense")))
+    key = content_key("solved places 3", compliance_key(model, dense=True))
     return key, None if model.path is None else model.path / f"places-{key[:16]}.bin"
 
 

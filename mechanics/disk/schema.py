@@ -136,7 +136,8 @@ def _faults(table: Any, schema: Schema, where: tuple[str, ...]) -> Iterator[tupl
             if not form.takes(value):
                 yield f"{_at(name, where)}{key} = {_shown(value)}; it must be {form.words}", _GRAVE
         elif isinstance(form, Named):
-            below += _faults(value, dict.fromkeys(value, form.form) if _is(value) else {}, (*where, key))
+            forms = dict.fromkeys(value, form.form) if isinstance(value, Mapping) else {}
+            below += _faults(value, forms, (*where, key))
         elif isinstance(form, Listed):
             if not isinstance(value, list):
                 yield f"[[{'.'.join((*where, key))}]] is {_shown(value)}; it must be a list of tables", _GRAVE
@@ -151,10 +152,6 @@ def _faults(table: Any, schema: Schema, where: tuple[str, ...]) -> Iterator[tupl
             meant = near(key, schema)
             allowed = f"did you mean {meant}?" if meant else f"allowed are {', '.join(schema) or 'no keys'}"
             yield f"{_at(name, where)}{key} is no key: {allowed}", _MISSPELT if meant else _UNKNOWN
-
-
-def _is(value: Any) -> bool:
-    return isinstance(value, Mapping)
 
 
 def _at(name: str, where: tuple[str, ...]) -> str:

@@ -6,15 +6,13 @@ A form without a theory; where the work of adhesion is what matters, jkr_adhesio
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.law import PathLaw
-from palpate.mechanics.effects.settings import TouchedScene, TouchTerms
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.kernels import kernel
 from palpate.mechanics.model.model import Model
 
@@ -58,10 +56,6 @@ def _touch(touch: TouchTerms, keys: Keys, model: Model) -> None:
     touch.numbers[LAW] = np.array([pull, reach, inside, _TURN_INSIDE * model.tool.tip_radius_m])
 
 
-def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
-    return {"pull_off_n": float(values[0]), "range_m": float(values[1]), "inside": float(values[2])}
-
-
 EFFECT = Effect(
     name="adhesion",
     domain="contact",
@@ -77,7 +71,9 @@ EFFECT = Effect(
         "range_m": FileKey(low=1e-6, high=0.1, unit="m", required=True),
         "inside": FileKey(low=0.0, high=1.0),
     },
-    report=_report,
+    report=lambda values, scene, modulus_pa: dict(
+        zip(("pull_off_n", "range_m", "inside"), map(float, values), strict=True)
+    ),
     touch=_touch,
     law=LAW,
     apply=unchanged,

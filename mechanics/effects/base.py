@@ -21,7 +21,6 @@ from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import Recording
 
-DOMAINS = ("object", "contact", "boundary", "instrument")
 Keys = Mapping[str, Any]
 """An effect's parameters as recording, model and JSON state them: SI units, device frame."""
 

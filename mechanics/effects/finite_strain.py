@@ -3,7 +3,7 @@ depth."""
 
 import numpy as np
 
-from palpate.mechanics.effects.base import Effect, Keys, Role, Scope, no_keys
+from palpate.mechanics.effects.base import Effect, Role, Scope, no_keys
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
 from palpate.mechanics.model.model import Model
 
@@ -16,10 +16,6 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
 
 def _of_material(touch: TouchTerms, model: Model) -> None:
     touch.dent_law = model.material.dent_law
-
-
-def _apply(model: Model, keys: Keys) -> Model:
-    return model.with_material(dent_law=LAW)
 
 
 EFFECT = Effect(
@@ -35,5 +31,5 @@ EFFECT = Effect(
     role=Role.KNOWN,
     change=_change,
     of_material=_of_material,
-    apply=_apply,
+    apply=lambda model, keys: model.with_material(dent_law=LAW),
 )

@@ -3,19 +3,9 @@
 import numpy as np
 
 from palpate.mechanics.disk.schema import FileKey
-from palpate.mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
-from palpate.mechanics.effects.settings import SHIFTED, ForwardSettings, TouchedScene
+from palpate.mechanics.effects.base import Effect, Parameter, Role, Scope
+from palpate.mechanics.effects.settings import SHIFTED
 from palpate.mechanics.recording.calibration import Calibration
-from palpate.mechanics.recording.recording import Recording
-
-
-def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
-    settings.read(SHIFTED, lambda force: force + values)
-
-
-def _correct(recording: Recording, keys: Keys) -> Recording:
-    return recording.corrected(Calibration(bias_n=np.asarray(keys["bias_n"], dtype=float)))
-
 
 EFFECT = Effect(
     name="force_bias",
@@ -26,7 +16,9 @@ EFFECT = Effect(
     keys={"bias_n": FileKey(low=-1e3, high=1e3, size=3, unit="N", required=True)},
     report=lambda values, scene, modulus_pa: {"bias_n": [float(v) for v in values]},
     role=Role.FREE_AIR,
-    change=_change,
-    correct=_correct,
+    change=lambda settings, values, scene: settings.read(SHIFTED, lambda force: force + values),
+    correct=lambda recording, keys: recording.corrected(
+        Calibration(bias_n=np.asarray(keys["bias_n"], dtype=float))
+    ),
     read_as=SHIFTED,
 )

@@ -6,17 +6,13 @@ import numpy as np
 
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
-from palpate.mechanics.effects.settings import SHIFTED, ForwardSettings, TouchedScene
+from palpate.mechanics.effects.settings import SHIFTED
 from palpate.mechanics.recording.recording import Recording
 
 
 def drifted(t: np.ndarray, rate_n_per_s: np.ndarray) -> np.ndarray:
     """(n, 3) N that the sensor reads too much at times t (n,) s of the recording's clock."""
     return t[:, None] * np.asarray(rate_n_per_s, dtype=float)
-
-
-def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
-    settings.read(SHIFTED, lambda force: force + drifted(scene.t, values))
 
 
 def _correct(recording: Recording, keys: Keys) -> Recording:
@@ -33,7 +29,9 @@ EFFECT = Effect(
     keys={"rate_n_per_s": FileKey(low=-1e3, high=1e3, size=3, unit="N/s", required=True)},
     report=lambda values, scene, modulus_pa: {"rate_n_per_s": [float(v) for v in values]},
     role=Role.FREE_AIR,
-    change=_change,
+    change=lambda settings, values, scene: settings.read(
+        SHIFTED, lambda force: force + drifted(scene.t, values)
+    ),
     correct=_correct,
     read_as=SHIFTED,
 )

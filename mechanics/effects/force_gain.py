@@ -3,20 +3,10 @@
 import numpy as np
 
 from palpate.mechanics.disk.schema import ANY
-from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import MIXED, ForwardSettings, TouchedScene
+from palpate.mechanics.effects.settings import MIXED
 from palpate.mechanics.recording.calibration import Calibration
-from palpate.mechanics.recording.recording import Recording
-
-
-def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
-    settings.read(MIXED, lambda force: force @ values.reshape(3, 3).T)
-
-
-def _correct(recording: Recording, keys: Keys) -> Recording:
-    return recording.corrected(Calibration(matrix=np.asarray(keys["matrix"], dtype=float)))
-
 
 EFFECT = Effect(
     name="force_gain",
@@ -33,8 +23,10 @@ EFFECT = Effect(
     keys={"matrix": ANY},
     report=lambda values, scene, modulus_pa: {"matrix": np.asarray(values).reshape(3, 3).tolist()},
     plain_words="the force sensor's axes read too much or too little, or into one another",
-    change=_change,
-    correct=_correct,
+    change=lambda settings, values, scene: settings.read(MIXED, lambda force: force @ values.reshape(3, 3).T),
+    correct=lambda recording, keys: recording.corrected(
+        Calibration(matrix=np.asarray(keys["matrix"], dtype=float))
+    ),
     read_as=MIXED,
     hints=SearchHints(
         hides_strain=True,

@@ -5,10 +5,9 @@ import dataclasses
 import numpy as np
 
 from palpate.mechanics.compliance.far_field import bracing_at_poisson, far_at_poisson
-from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
-from palpate.mechanics.model.model import Model
 from palpate.mechanics.plausible import POISSON_RATIO
 
 
@@ -16,10 +15,6 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
     settings.nu = float(values[0])
     settings.far = settings.far - scene.places.far + far_at_poisson(scene.places, settings.nu)
     settings.bracing = settings.bracing - scene.places.bracing + bracing_at_poisson(scene.places, settings.nu)
-
-
-def _apply(model: Model, keys: Keys) -> Model:
-    return model.with_material(poisson_ratio=keys["poisson_ratio"])
 
 
 EFFECT = Effect(
@@ -31,7 +26,7 @@ EFFECT = Effect(
     keys={"poisson_ratio": dataclasses.replace(POISSON_RATIO, required=True)},
     report=lambda values, scene, modulus_pa: {"poisson_ratio": float(values[0])},
     change=_change,
-    apply=_apply,
+    apply=lambda model, keys: model.with_material(poisson_ratio=keys["poisson_ratio"]),
     hints=SearchHints(
         hides_strain=True,
         stands_for_strain=True,

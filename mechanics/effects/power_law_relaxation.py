@@ -10,7 +10,6 @@ faster feels no more than 5 ms do, one that lasts longer relaxes no further.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
@@ -18,7 +17,7 @@ from scipy.optimize import nnls
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from palpate.mechanics.effects.hints import SearchHints
-from palpate.mechanics.effects.settings import TouchedScene, TouchTerms
+from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.effects.viscoelasticity import add_terms
 from palpate.mechanics.model.model import Model
 
@@ -55,10 +54,6 @@ def _in_words(keys: Keys) -> str:
     return f"extra force after a fast press: {100 * share:.0f} % after 1 s, {100 * later:.0f} % after 10 s"
 
 
-def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[str, Any]:
-    return {"share": float(values[0]), "exponent": float(values[1])}
-
-
 EFFECT = Effect(
     name="power_law_relaxation",
     domain="object",
@@ -72,7 +67,7 @@ EFFECT = Effect(
         "share": FileKey(low=0.0, high=1e3, required=True),
         "exponent": FileKey(low=1e-3, high=0.999, required=True),
     },
-    report=_report,
+    report=lambda values, scene, modulus_pa: {"share": float(values[0]), "exponent": float(values[1])},
     keys_in_words=_in_words,
     touch=_touch,
     apply=unchanged,

@@ -13,7 +13,7 @@ import numpy as np
 
 from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
 from palpate.mechanics.contact.dent import grid
-from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
 from palpate.mechanics.model.material import SKIN, Skin
@@ -68,10 +68,6 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
     settings.far = settings.far + _FAR_SHARE * (changed - places.far)
 
 
-def _apply(model: Model, keys: Keys) -> Model:
-    return model.with_material(skin=Skin(**keys))
-
-
 EFFECT = Effect(
     name="skin_layer",
     domain="object",
@@ -85,7 +81,7 @@ EFFECT = Effect(
     report=_report,
     of_material=_of_material,
     change=_change,
-    apply=_apply,
+    apply=lambda model, keys: model.with_material(skin=Skin(**keys)),
     hints=SearchHints(
         hides_strain=True,
         stands_for_strain=True,

@@ -4,22 +4,17 @@ place."""
 import numpy as np
 
 from palpate.mechanics.disk.schema import FileKey
-from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import LATE, ForwardSettings, TouchedScene
 from palpate.mechanics.law_errors import Latency
 from palpate.mechanics.recording.calibration import Calibration
-from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import delayed
 
 
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     parts = [slice(a, b) for a, b in zip(scene.start[:-1], scene.start[1:], strict=True)]
     settings.read(LATE, lambda force: delayed(parts, scene.t, force, values[0]))
-
-
-def _correct(recording: Recording, keys: Keys) -> Recording:
-    return recording.corrected(Calibration(delay_s=float(keys["delay_s"])))
 
 
 EFFECT = Effect(
@@ -31,7 +26,7 @@ EFFECT = Effect(
     keys={"delay_s": FileKey(low=-10.0, high=10.0, unit="s", required=True)},
     report=lambda values, scene, modulus_pa: {"delay_s": float(values[0])},
     change=_change,
-    correct=_correct,
+    correct=lambda recording, keys: recording.corrected(Calibration(delay_s=float(keys["delay_s"]))),
     read_as=LATE,
     hints=SearchHints(
         systematic=(2e-4,),

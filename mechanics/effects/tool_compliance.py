@@ -3,19 +3,14 @@
 import numpy as np
 
 from palpate.mechanics.disk.schema import FileKey
-from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope
+from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
 from palpate.mechanics.recording.calibration import Calibration
-from palpate.mechanics.recording.recording import Recording
 
 
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.tool_compliance = values[0]
-
-
-def _correct(recording: Recording, keys: Keys) -> Recording:
-    return recording.corrected(Calibration(stiffness_n_per_m=keys["stiffness_n_per_m"]))
 
 
 EFFECT = Effect(
@@ -27,7 +22,9 @@ EFFECT = Effect(
     keys={"stiffness_n_per_m": FileKey(low=1.0, high=1e12, unit="N/m", required=True)},
     report=lambda values, scene, modulus_pa: {"stiffness_n_per_m": float(1 / np.maximum(values[0], 1e-9))},
     change=_change,
-    correct=_correct,
+    correct=lambda recording, keys: recording.corrected(
+        Calibration(stiffness_n_per_m=keys["stiffness_n_per_m"])
+    ),
     read_as=-1,
     hints=SearchHints(
         hides_strain=True,

@@ -19,7 +19,8 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.elastic.elasticity import shape_derivatives
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.kernels import kernel
-from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces, vertex_normals
+from palpate.mechanics.shape.nearest import facings
+from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces, tet_volumes, vertex_normals
 from palpate.mechanics.shape.true_shape import TrueShape
 
 LONGEST_M = 0.003
@@ -78,9 +79,8 @@ class CurvedSurface:
         self._tree = cKDTree(corner.mean(axis=1))
         self._candidates = min(24, len(corner))
         normals = vertex_normals(self.vertices, self.triangles)[self.triangles]
-        across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
-        smooth = np.einsum("kci,ki->kc", normals, across) > _SMOOTH_COSINE
+        _, facing = facings(self.vertices, self.triangles)
+        smooth = np.einsum("kci,ki->kc", normals, facing) > _SMOOTH_COSINE
         self._normals = np.where(smooth[..., None] & curved, normals, 0.0)
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
@@ -274,23 +274,18 @@ def _moved(points: np.ndarray, nodes: np.ndarray, to: np.ndarray, tets: np.ndarr
     mine = np.zeros(len(points), dtype=bool)
     mine[nodes] = True
     near = tets[mine[tets].any(axis=1)]
-    before, share = _volumes(points, near), np.zeros(len(points))
+    before, share = tet_volumes(points, near), np.zeros(len(points))
     share[nodes] = 1.0
     way = np.zeros_like(points)
     way[nodes] = to - points[nodes]
     for _ in range(8):
         moved = points + share[:, None] * way
-        bad = _volumes(moved, near) < _LEAST_VOLUME * before
+        bad = tet_volumes(moved, near) < _LEAST_VOLUME * before
         if not bad.any():
             return moved
         back = np.unique(near[bad])
         share[back] = np.where(share[back] > 0.2, share[back] - 0.25, 0.0)
     return points
-
-
-def _volumes(points: np.ndarray, tets: np.ndarray) -> np.ndarray:
-    a, b, c, d = (points[tets[:, k]] for k in range(4))
-    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
 
 
 def _curved(mesh: TetMesh, faces: np.ndarray, surface: CurvedSurface | None) -> np.ndarray:
@@ -311,7 +306,7 @@ def _curved(mesh: TetMesh, faces: np.ndarray, surface: CurvedSurface | None) -> 
     chosen = np.zeros(len(bent), dtype=bool)
     chosen[middles[close]] = True
     cells = mesh.tetrahedra[chosen[mesh.tetrahedra].any(axis=1)]
-    straight = 6 * _volumes(mesh.points, cells)
+    straight = 6 * tet_volumes(mesh.points, cells)
     for _ in range(10):
         bad = _least_jacobian(bent, cells) < 0.25 * straight
         if not bad.any():

@@ -12,14 +12,12 @@ from palpate.mechanics.presses.table import HOLDING, LOADING, UNLOADING
 
 THIRDS = 3
 PHASES = (LOADING, HOLDING, UNLOADING)
-BINS = {"depth_n": THIRDS, "phase_n": len(PHASES), "time_n": THIRDS}
-"""Bins beside those of the presses, and how many."""
 
 
 def gap_by_bin(
     square: np.ndarray, press: np.ndarray, presses: int, depth: np.ndarray, phase: np.ndarray, t: np.ndarray
 ) -> dict[str, list[float]]:
-    """N rms of a gap's 3-vector: `press_n` (presses,), and BINS; 0 where a bin has no sample.
+    """N rms of a gap's 3-vector: `press_n` (presses,), `depth_n`, `phase_n`, `time_n` (3,); 0 for none.
 
     square: (n,) N^2, the gap's squared length, less what chance adds to it where it was measured (then it may
     be negative). press: (n,) of 0 to presses - 1. depth: (n,) in any unit, in thirds of the greatest. phase:

@@ -1,4 +1,4 @@
-"""Velocity and acceleration of a sampled path, by local quadratic fits (Savitzky and Golay, 1964)."""
+"""Acceleration along a sampled path, by local quadratic fits (Savitzky and Golay, 1964)."""
 
 from __future__ import annotations
 
@@ -9,20 +9,12 @@ WIDTH_S = 0.05
 _EVEN = 1e-3  # of a step: less is rounding of the clock
 
 
-def velocity(t: np.ndarray, path: np.ndarray, *, width_s: float = WIDTH_S) -> np.ndarray:
-    """Rate of path (n, ...) by time t (n,) s, which increases, fitted over `width_s`; exact on parabolas.
+def acceleration(t: np.ndarray, path: np.ndarray, *, width_s: float = WIDTH_S) -> np.ndarray:
+    """Second derivative of path (n, ...) by time t (n,) s, which increases, fitted over `width_s`; exact on
+    parabolas.
 
     A clock that is not even is made so by interpolation. Fewer than three samples give 0.
     """
-    return _derivative(t, path, 1, width_s)
-
-
-def acceleration(t: np.ndarray, path: np.ndarray, *, width_s: float = WIDTH_S) -> np.ndarray:
-    """Second derivative of path (n, ...) by time, as `velocity`."""
-    return _derivative(t, path, 2, width_s)
-
-
-def _derivative(t: np.ndarray, path: np.ndarray, order: int, width_s: float) -> np.ndarray:
     from scipy.signal import savgol_filter  # here: it brings scipy.stats, and a touch needs neither
 
     t, path = np.asarray(t, dtype=float), np.asarray(path, dtype=float)
@@ -38,7 +30,7 @@ def _derivative(t: np.ndarray, path: np.ndarray, order: int, width_s: float) -> 
         path = _interpolated(even, t, path)
     samples = max(2 * round(width_s / step / 2) + 1, 5)
     samples = min(samples, len(even) - 1 + len(even) % 2)
-    found = savgol_filter(path, samples, 2, deriv=order, delta=step, axis=0, mode="interp")
+    found = savgol_filter(path, samples, 2, deriv=2, delta=step, axis=0, mode="interp")
     return _interpolated(t, even, found) if uneven else found
 
 

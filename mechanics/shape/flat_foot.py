@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from palpate.mechanics.disk.surface_files import ClosedSurface
 from palpate.mechanics.errors import PalpateWarning, SurfaceError
-from palpate.mechanics.shape.nearest import triangle_areas
+from palpate.mechanics.shape.nearest import facings, triangle_areas
 
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
 """Directions out of the support along the axes of the file's frame."""
@@ -207,14 +207,9 @@ def _tilted(
     plane; the share of it on that plane; and the direction (3,) out of it. None where the object stands as
     stated."""
     size = float(np.ptp(vertices, axis=0).max())
-    corners = vertices[triangles]
-    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(facing, axis=1) / 2
-    facing /= np.maximum(2 * area[:, None], 1e-300)
+    area, (_, facing) = triangle_areas(vertices, triangles), facings(vertices, triangles)
     hull = ConvexHull(vertices)
-    a, b, c = (vertices[hull.simplices[:, k]] for k in range(3))
-    large = np.argsort(np.linalg.norm(np.cross(b - a, c - a), axis=1))[::-1]
-    planes = hull.equations[large]
+    planes = hull.equations[np.argsort(triangle_areas(vertices, hull.simplices))[::-1]]
     planes = planes[planes[:, :3] @ normal <= -np.cos(np.radians(most))][:50]
 
     def on(plane: np.ndarray) -> np.ndarray:
@@ -238,9 +233,7 @@ def _tilted(
 
 def _foot(vertices: np.ndarray, triangles: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """(m,) bool: the triangles at the bottom that look down."""
-    corners = vertices[triangles]
-    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+    _, facing = facings(vertices, triangles)
     height = vertices @ normal
     high = height[triangles].max(axis=1) - height.min()
     return (facing @ normal < -_FACING) & (high < _LOW * np.ptp(vertices, axis=0).max())
@@ -248,8 +241,7 @@ def _foot(vertices: np.ndarray, triangles: np.ndarray, normal: np.ndarray) -> np
 
 def _is_point(vertices: np.ndarray, triangles: np.ndarray, foot: np.ndarray, normal: np.ndarray) -> bool:
     """Whether a foot (m,) bool is the bottom of a round underside."""
-    corners = vertices[triangles]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ normal / 2
+    areas = facings(vertices, triangles)[0] @ normal / 2
     if -areas[foot].sum() > _POINT * np.maximum(areas, 0.0).sum():
         return False
     beside = np.isin(triangles, np.unique(triangles[foot])).any(axis=1) & ~foot

@@ -9,8 +9,15 @@ import numpy as np
 
 def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(k,) m^2, of straight triangles (k, 3 or 6) of points (n, 3) m."""
+    return np.linalg.norm(facings(points, triangles)[0], axis=1) / 2
+
+
+def facings(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k, 3) m^2, twice each triangle's area along its normal, and the (k, 3) unit normals; 0 of one without
+    area."""
     a, b, c = np.moveaxis(points[triangles[:, :3]], 1, 0)
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    across = np.cross(b - a, c - a)
+    return across, across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
 
 
 def farthest_apart(points: np.ndarray, most: int) -> np.ndarray:
@@ -110,8 +117,7 @@ def first_hits(
 
     vertices, triangles = np.asarray(vertices, dtype=float), np.asarray(triangles)
     shell = pyvista.PolyData.from_regular_faces(vertices, triangles)
-    corner = vertices[triangles]
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    across, _ = facings(vertices, triangles)
     middle, size = vertices.mean(axis=0), float(np.linalg.norm(np.ptp(vertices, axis=0)))
     found, hit = np.full(len(starts), np.inf), np.full(len(starts), -1)
     for k, (start, way) in enumerate(zip(starts, directions, strict=True)):
@@ -120,7 +126,7 @@ def first_hits(
         # a triangle that the ray runs along has no one place where they meet
         met = met[np.abs(across[met] @ way) > 1e-9 * np.linalg.norm(across[met], axis=1)]
         # the tree's points are of single precision, so where it meets each triangle's plane is found again
-        far = np.einsum("ij,ij->i", corner[met, 0] - start, across[met]) / (across[met] @ way)
+        far = np.einsum("ij,ij->i", vertices[triangles[met, 0]] - start, across[met]) / (across[met] @ way)
         met, far = met[far > beyond], far[far > beyond]
         if len(met):
             found[k], hit[k] = far.min(), met[np.argmin(far)]

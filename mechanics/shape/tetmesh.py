@@ -70,8 +70,7 @@ class TetMesh:
     @cached_property
     def volumes(self) -> np.ndarray:
         """(m,) m^3, of the straight-sided tetrahedra."""
-        p = self.points[self.tetrahedra[:, :4]]
-        return np.einsum("ij,ij->i", np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), p[:, 3] - p[:, 0]) / 6
+        return tet_volumes(self.points, self.tetrahedra)
 
     @cached_property
     def surface(self) -> np.ndarray:
@@ -141,6 +140,12 @@ class TetMesh:
             np.concatenate([self.touchable, touch_mid]),
             self.shape,
         )
+
+
+def tet_volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    """(m,) m^3, of straight tetrahedra (m, 4 or more), negative where turned inside out."""
+    a, b, c, d = np.moveaxis(points[tetrahedra[:, :4]], 1, 0)
+    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6
 
 
 def lone_faces(tetrahedra: np.ndarray) -> np.ndarray:

@@ -48,8 +48,6 @@ from palpate.reconstruction.steps.s3_contacts.sliding_presses import FLAT
 OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Measured], Iterator[Finding]], ...] = (support, dropped, sloping, slow)
 OF_RESULTS: tuple[Callable[[ReconstructionOutcome], Iterator[Finding]], ...] = (outcome,)
-REFUSALS = ("no base", "no presses")
-"""Findings that say where reconstruction itself stops, fault or not."""
 _LEAST_SAMPLES = 100
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from palpate.mechanics.shape.nearest import facings
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.statistics import EFFICIENT, spread_about_zero, tukey
 
@@ -167,9 +168,7 @@ class _Solver:
 
         self.body, self.touched = body, touched
         self.shell = pyvista.PolyData.from_regular_faces(body.vertices, body.triangles)
-        corner = body.vertices[body.triangles]
-        facing = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        self.facing = facing / np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+        _, self.facing = facings(body.vertices, body.triangles)
         self.size = float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
         self.pivot = touched.centres.mean(axis=0)
         scale = self.size / 0.1

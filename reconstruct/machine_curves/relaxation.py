@@ -89,9 +89,11 @@ def thinned(t: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return t[keep], value[keep]
 
 
-def held_out_relaxation(
-    t: np.ndarray, value: np.ndarray, most_terms: int = 2
-) -> tuple[dict[str, float], Relaxation]:
+_TERMS = (1, 2)
+"""Exponentials that are tried."""
+
+
+def held_out_relaxation(t: np.ndarray, value: np.ndarray) -> tuple[dict[str, float], Relaxation]:
     """(name -> rms error over rms value, blocks even in log time left out in turn; the fit of the best
     number of exponentials). 'spring' does not relax, 'power' falls by a power of time, 'spectrum' has two
     exponentials a decade, 'regression' interpolates."""
@@ -111,14 +113,14 @@ def held_out_relaxation(
         kernel = np.column_stack([np.ones(len(t)), np.exp(-(t - t[0])[:, None] / ladder)])
         weights = nnls(kernel[seen], value[seen])[0]
         predicted.setdefault("spectrum", np.zeros(len(t)))[held] = kernel[held] @ weights
-        for terms in range(1, most_terms + 1):
+        for terms in _TERMS:
             out = predicted.setdefault(f"prony-{terms}", np.zeros(len(t)))
             out[held] = _at(
                 fit_relaxation(t[seen], value[seen], terms=terms), t[seen][0], value[seen][0], t[held]
             )
     size = float(np.sqrt((value**2).mean()))
     errors = {name: float(np.sqrt(((p - value) ** 2).mean())) / size for name, p in predicted.items()}
-    terms = min(range(1, most_terms + 1), key=lambda k: errors[f"prony-{k}"])
+    terms = min(_TERMS, key=lambda k: errors[f"prony-{k}"])
     return errors, fit_relaxation(t, value, terms=terms)
 
 

@@ -213,11 +213,9 @@ class UniaxialFit:
         """At no strain."""
         return self.law.young(self.coefficients, self.shape)
 
-    def stress(self, stretch: np.ndarray, zero: float | None = None) -> np.ndarray:
+    def stress(self, stretch: np.ndarray) -> np.ndarray:
         """Pa."""
-        return (
-            self.law.columns(stretch - (self.zero if zero is None else zero), self.shape) @ self.coefficients
-        )
+        return self.law.columns(stretch - self.zero, self.shape) @ self.coefficients
 
 
 def fit_law(curves: Sequence[Uniaxial], law: UniaxialLaw) -> UniaxialFit:

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.frames import support_axes
 from palpate.mechanics.shape.flat_foot import Standing
-from palpate.mechanics.shape.nearest import closest
+from palpate.mechanics.shape.nearest import closest, facings, triangle_areas
 from palpate.reconstruction.shapes.kriging import Explained
 
 _SAMPLES = np.array([[1 / 3, 1 / 3, 1 / 3], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
@@ -73,9 +73,7 @@ def decimated(stood: Standing, edge_m: float) -> tuple[np.ndarray, np.ndarray]:
     import trimesh
 
     vertices, triangles = stood.vertices, stood.triangles
-    corners = vertices[triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    wanted = _FINER * area.sum() / (_PER_TRIANGLE * edge_m**2)
+    wanted = _FINER * triangle_areas(vertices, triangles).sum() / (_PER_TRIANGLE * edge_m**2)
     if len(triangles) <= 1.2 * wanted:
         return vertices, triangles
     axes = support_axes(stood.support_normal)
@@ -131,8 +129,7 @@ def corner_normals(
 
     The base's faces count for vertices inside the base alone.
     """
-    corner = vertices[triangles]
-    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area, _ = facings(vertices, triangles)
     size = np.linalg.norm(area, axis=1)
     kept = (size > 1e-14) & ~on_base[triangles].all(axis=1)
     area, size, faces = area[kept], size[kept], triangles[kept]
@@ -177,8 +174,7 @@ def moved(
 def signed_gap(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     """(k,) m: distance of points (k, 3) from the surface, negative inside."""
     foot, index, _ = closest(vertices, triangles, points)
-    corner = vertices[triangles[index]]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal, _ = facings(vertices, triangles[index])
     side = np.sign(np.einsum("ij,ij->i", points - foot, normal))
     return side * np.linalg.norm(points - foot, axis=1)
 

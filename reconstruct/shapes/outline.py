@@ -41,11 +41,11 @@ def fit_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     return *found.fitted, float(np.sqrt(np.average(found.residual**2, weights=found.weight)))
 
 
-def farthest_points(points: np.ndarray, spacing_m: float, start: int = 0) -> np.ndarray:
+def farthest_points(points: np.ndarray, spacing_m: float) -> np.ndarray:
     """Indices of a farthest-point sample: added until no point is further than `spacing_m` from the
     sample."""
-    chosen = [start]
-    distance = np.linalg.norm(points - points[start], axis=1)
+    chosen = [0]
+    distance = np.linalg.norm(points - points[0], axis=1)
     while distance.max() > spacing_m:
         chosen.append(int(np.argmax(distance)))
         distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))

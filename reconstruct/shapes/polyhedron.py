@@ -18,10 +18,10 @@ from palpate.reconstruction.shapes.fit import LEAN_M, Evidence
 from palpate.reconstruction.shapes.outline import Outline, farthest_points, sides
 from palpate.reconstruction.shapes.shape import ShapeParameter, values_of, with_values
 
-_SECTORS = 48
+_SECTORS, _RIM_SPACING_M = 48, 0.005
 
 
-def hull_surface(evidence: Evidence, base_spacing_m: float = 0.005) -> tuple[np.ndarray, np.ndarray]:
+def hull_surface(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) and outward triangles (m, 3) of the hull in the support frame, base on z = 0.
 
     Touched points below the support are lifted onto it. The hull is an inner bound of a convex object.
@@ -30,7 +30,7 @@ def hull_surface(evidence: Evidence, base_spacing_m: float = 0.005) -> tuple[np.
 
     rim = evidence.to_support(evidence.outline)
     rim[:, 2] = 0.0
-    rim = rim[farthest_points(rim, base_spacing_m)]
+    rim = rim[farthest_points(rim, _RIM_SPACING_M)]
     touched = evidence.to_support(evidence.points)
     touched[:, 2] = np.maximum(touched[:, 2], 0.0)
     return delaunay_hull(np.vstack([rim, touched]))
@@ -55,10 +55,10 @@ def delaunay_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return vertices, triangles
 
 
-def tangent_surface(evidence: Evidence, slack_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def tangent_surface(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) and outward triangles (m, 3) in the support frame, base on z = 0.
 
-    A plane stands at every touch, moved out by `slack_m`, facing as the first force says but turned as far as
+    A plane stands at every touch, facing as the first force says but turned as far as
     needed for no other touch to lie before it (`supporting_normals`), so that the hull lies inside. An object
     that does not lean outwards stays within its base: an upright plane stands at each of 48 sectors of the
     outline, as far out as tracing hands lean in.
@@ -68,10 +68,10 @@ def tangent_surface(evidence: Evidence, slack_m: float = 0.0) -> tuple[np.ndarra
     touched = evidence.to_support(evidence.points)
     ground = np.column_stack([rim[::8], np.zeros(len(rim[::8]))])
     normals = supporting_normals(touched, evidence.normals @ evidence.axes.T, np.vstack([touched, ground]))
-    offsets = (touched * normals).sum(axis=1) + slack_m
+    offsets = (touched * normals).sum(axis=1)
     angle = 2 * np.pi * np.arange(_SECTORS) / _SECTORS
     walls = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_SECTORS)])
-    reach = (rim @ walls[:, :2].T).max(axis=0) + LEAN_M + slack_m
+    reach = (rim @ walls[:, :2].T).max(axis=0) + LEAN_M
     top = touched[:, 2].max() + 0.02
     planes = np.vstack(
         [

@@ -18,6 +18,7 @@ from palpate.mechanics.errors import SurfaceError
 from palpate.mechanics.frames import support_axes
 from palpate.mechanics.options import option
 from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.nearest import facings
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.reconstruction.shapes.choice import (
@@ -76,9 +77,7 @@ def cast(
     passed over, so that a touch beside an edge stays on its own face.
     """
     triangles = triangles[:, :3]
-    corners = vertices[triangles]
-    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+    corners, (_, facing) = vertices[triangles], facings(vertices, triangles)
     smooth = vertex_normals(vertices, triangles)
     where = np.empty_like(points)
     normals = np.empty_like(points)

@@ -198,20 +198,24 @@ class FemRenderer(Renderer):
         return np.einsum("vc,vcx->vx", self.contact.node_weights, corners[self._drawn])
 
 
-def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
-    """The registry's entry."""
-    return FemRenderer(model, options, progress=progress)
-
-
-def create_on_demand(model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
-    """One that solves the places that a tip comes to, unless all are known: headless, for one tip."""
-    return FemRenderer(model, options, compliance=load_or_solve(model, progress))
-
-
-def create_coarse(model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
-    """One that renders at once what is kept of a model's compliance, its first places at least; condensed
-    where that is not there."""
-    return FemRenderer(model, options, compliance=load_coarse(model), progress=progress)
+def create(
+    name: str,
+    model: Model,
+    options: RenderOptions,
+    progress: Progress = silent,
+    *,
+    on_demand: bool = False,
+    coarse: bool = False,
+) -> FemRenderer:
+    """The registry's entry. on_demand: it solves the places that a tip comes to, unless all are known.
+    coarse: it renders at once what is kept of the compliance, its first places at least; condensed where that
+    is not there."""
+    kept: Compliance | None = None
+    if on_demand:
+        kept = load_or_solve(model, progress)
+    elif coarse:
+        kept = load_coarse(model)
+    return FemRenderer(model, options, compliance=kept, progress=progress)
 
 
 def _arrays(state: Any) -> list[np.ndarray]:

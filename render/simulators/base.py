@@ -28,7 +28,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.names import number, pairs, words_of
 from palpate.mechanics.shape.refine import refined_around
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.render.base import Renderer, check_radii
+from palpate.render.base import Renderer, check_radii, new_state
 from palpate.render.options import RenderOptions
 from palpate.render.simulators.tunable import Tunable
 from palpate.render.surface.snapping import touched_surface
@@ -262,11 +262,7 @@ class SimulatorRenderer(Renderer):
 
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> SimulatedState:
         radii = check_radii(radii_m, self.model)
-        m = len(radii)
-        return SimulatedState(
-            np.zeros((m, 3)), np.zeros(m, dtype=np.int64), np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m),
-            np.zeros(m), radii.copy(), np.array([dt_s]), np.zeros(1, dtype=np.int64), [None] * m,
-        )  # fmt: skip
+        return SimulatedState(*new_state(radii, dt_s), world=[None] * len(radii))
 
     def step(self, state: SimulatedState, tips: np.ndarray) -> tuple[SimulatedState, np.ndarray]:
         near = self._tree.query(np.asarray(tips, dtype=float))[0] - state.radii_m

@@ -10,19 +10,15 @@ What limits it is the mesh under the tip: with edges of half the radius a shallo
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
-from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.base import Renderer
+from palpate.render.options import BEST, DOCUMENTED, RenderOptions
 from palpate.render.simulators.base import ScriptedAdapter, made
 from palpate.render.simulators.tunable import EDGES, Tunable, density
-
-if TYPE_CHECKING:
-    from palpate.mechanics.model.model import Model
-    from palpate.render.base import Renderer
-    from palpate.render.options import RenderOptions
 
 
 @dataclass(frozen=True)

@@ -13,20 +13,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.base import Renderer
+from palpate.render.options import BEST, DOCUMENTED, RenderOptions
 from palpate.render.simulators.base import SteppedAdapter, Touch, made
 from palpate.render.simulators.tunable import EDGES, Tunable, density
-
-if TYPE_CHECKING:
-    from palpate.mechanics.model.model import Model
-    from palpate.render.base import Renderer
-    from palpate.render.options import RenderOptions
 
 POISSON_LIMIT = 0.45
 """Beyond it linear tetrahedra lock, and the solver of the elastic forces does not converge at 0.49."""

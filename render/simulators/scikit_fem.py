@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -17,16 +17,13 @@ from scipy.sparse.linalg import splu
 
 from palpate.mechanics.elastic import pardiso
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.base import Renderer
+from palpate.render.options import BEST, DOCUMENTED, RenderOptions
 from palpate.render.simulators.base import Adapter, World, made
 from palpate.render.simulators.tunable import EDGES, Tunable
-
-if TYPE_CHECKING:
-    from palpate.mechanics.model.model import Model
-    from palpate.render.base import Renderer
-    from palpate.render.options import RenderOptions
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.errors import MeshError
-from palpate.mechanics.shape.nearest import neighbours
+from palpate.mechanics.shape.nearest import facings, neighbours
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.render.surface.bvh import Bvh, build_bvh
 from palpate.render.surface.shaped import (
@@ -30,7 +30,7 @@ from palpate.render.surface.shaped import (
     halved_where_bent,
     on_shape,
 )
-from palpate.render.surface.triangles import faces, pseudonormals
+from palpate.render.surface.triangles import pseudonormals
 
 CREASE_DEGREES = 35.0
 
@@ -87,8 +87,11 @@ class ContactSurface:
         return float(np.median(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2)))
 
 
-def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_000) -> ContactSurface:
-    """Round and refine a mesh's boundary to about `edge_m`, with at most about `largest` triangles.
+LARGEST = 60_000
+
+
+def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3) -> ContactSurface:
+    """Round and refine a mesh's boundary to about `edge_m`, with at most about LARGEST triangles.
 
     Where the mesh's shape is known every vertex is put onto it, and edges are halved where it bends.
     Raises MeshError where the boundary is not closed.
@@ -99,7 +102,7 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     edges = mesh.points[corners] - mesh.points[np.roll(corners, 1, axis=1)]
     longest = float(np.median(np.linalg.norm(edges, axis=2)))
     parts = max(1, round(longest / edge_m))
-    while parts > 1 and len(corners) * parts**2 > largest:
+    while parts > 1 and len(corners) * parts**2 > LARGEST:
         parts -= 1
     barycentric, cells = _lattice(parts)
     corner_normals = _corner_normals(mesh.points, corners, touchable)
@@ -116,7 +119,7 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     if shape is not None:
         feet = Feet(shape)
         vertices, triangles, within, parent_weights = halved_where_bent(
-            feet, vertices, triangles, free, parent_weights, largest
+            feet, vertices, triangles, free, parent_weights, LARGEST
         )
         free, parents = free[within], parents[within]
         placed = on_shape(feet, vertices, triangles, free, parent_weights)
@@ -142,7 +145,7 @@ def with_vertices(
     vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, free: np.ndarray
 ) -> SurfaceArrays:
     """The kernels' arrays for these vertices: normals, pseudonormals and search tree."""
-    area, face = faces(vertices, triangles)
+    area, face = facings(vertices, triangles)
     edge_pseudo = face[:, None, :] + face[neighbours]
     return SurfaceArrays(
         vertices=np.ascontiguousarray(vertices),
@@ -225,9 +228,7 @@ def _smooth_normals(
 
 def _corner_normals(points: np.ndarray, triangles: np.ndarray, touchable: np.ndarray) -> np.ndarray:
     """(k, 3, 3) unit normals of each corner, averaged over the faces joined to it without a crease."""
-    p = points[triangles]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    face = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
+    area, face = facings(points, triangles)
     k = len(triangles)
     across = neighbours(triangles)
     rows, columns = [], []

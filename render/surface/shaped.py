@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.frames import unit_vectors
+from palpate.mechanics.shape.nearest import facings, triangle_areas
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.surface.triangles import cut, cut_beside, pseudonormals
 
@@ -163,8 +164,7 @@ def _of_side(placed: np.ndarray, normals: np.ndarray, touch: np.ndarray) -> np.n
 
     A point of the foot's rim is the base's as well, and what the shape says there may point straight down.
     """
-    p = placed[touch]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    area, _ = facings(placed, touch)
     total = np.zeros_like(placed)
     np.add.at(total, touch, area[:, None])
     side = unit_vectors(total, normals)
@@ -245,9 +245,7 @@ def _given_back(
     """Put vertices back to where they were whose triangles lost their area on a crease, the one that came
     from farthest first: `placed` and `creased` change."""
     for _ in range(3):
-        p = placed[touch]
-        twice = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-        flat = touch[(twice < _NO_AREA * edge_m**2) & creased[touch].any(axis=1)]
+        flat = touch[(2 * triangle_areas(placed, touch) < _NO_AREA * edge_m**2) & creased[touch].any(axis=1)]
         if not len(flat):
             return
         farthest = np.argmax(np.where(creased[flat], away[flat], -1.0), axis=1)
@@ -319,6 +317,5 @@ def _smooth_step(x: np.ndarray) -> np.ndarray:
 
 
 def _mean_normal(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    p = vertices[triangles]
-    total = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]).sum(axis=0)
+    total = facings(vertices, triangles)[0].sum(axis=0)
     return total / max(float(np.linalg.norm(total)), 1e-300)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from palpate.mechanics.shape.nearest import facings
+
 _WIDER = 1.15
 """Widths that a vertex must be away from a rim for its edges to be cut."""
 _PATTERNS = tuple(
@@ -44,18 +46,9 @@ def cut_beside(
     return cut(vertices, triangles, weights, ends, np.where(first, share, 1 - share))
 
 
-def faces(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(m, 3) m^2, twice each triangle's area along its normal, and the (m, 3) unit normals; 0 of one without
-    area."""
-    p = vertices[triangles]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    length = np.linalg.norm(area, axis=1, keepdims=True)
-    return area, area / np.where(length > 0, length, 1.0)
-
-
 def pseudonormals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(v, 3) unit: means of the triangles' normals around each vertex, by their angles there."""
-    p, (_, face) = vertices[triangles], faces(vertices, triangles)
+    p, (_, face) = vertices[triangles], facings(vertices, triangles)
     total = np.zeros_like(vertices)
     for c in range(3):
         a, b = p[:, (c + 1) % 3] - p[:, c], p[:, (c + 2) % 3] - p[:, c]

@@ -24,8 +24,6 @@ STUCK = 0.05
 """Solved way sideways of a tip that sticks, over the press's depth, after the deepest."""
 SLIDE = 0.6
 """Length of a slide over the press's depth: a sphere on a half-space slips as a whole from 0.43 on."""
-LAWS = ("linear", "neo-hookean")
-"""Of mechanics.press_solver: one solid where strains are small."""
 MESH_SHARE, SHAPE_M, SLIP_SHARE = 0.01, 5e-6, 0.07
 """What the bound holds beside the laws: of the force, by the solver's own mesh (`palpate bench
 press-solver`); of the depth, by facets of a body's file; of the force sideways, by Mindlin's law."""

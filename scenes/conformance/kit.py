@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import numpy as np
 
@@ -53,13 +52,6 @@ class Made:
         return [
             f"kit {self.version}: {len(self.cases)} cases, {self.size_bytes / 1e6:.1f} MB, in {self.path}"
         ]
-
-    def as_json(self) -> dict[str, Any]:
-        """Keys with units."""
-        return {
-            "path": str(self.path), "version": self.version, "size_bytes": self.size_bytes,
-            "cases": list(self.cases),
-        }  # fmt: skip
 
 
 def write_kit(path: Path | str, progress: Progress = silent) -> Made:

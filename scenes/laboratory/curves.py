@@ -22,9 +22,9 @@ import numpy as np
 from palpate.mechanics.disk.writing import atomic_file, check_room
 from palpate.mechanics.progress import Progress, silent
 from palpate.scenes.laboratory.linear import LinearProblem
-from palpate.scenes.laboratory.mesh import coarse_mesh, laboratory_cache
+from palpate.scenes.laboratory.mesh import coarse_mesh, laboratory_cache, surface_key
 from palpate.scenes.laboratory.solver import LabError
-from palpate.scenes.laboratory.specimen import Fineness, Specimen, build, phantom_key
+from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
 from palpate.scenes.phantoms import Phantom
 
 LOADING = np.array([0.0, 0.03, 0.08, 0.16, 0.26, 0.38, 0.51, 0.64, 0.78, 0.9, 1.0])
@@ -187,7 +187,7 @@ def curves(
     """
     fineness, progress, label = solving.fineness, solving.progress, solving.label
     cache = solving.cache or laboratory_cache()
-    shape = phantom_key(phantom)
+    shape = surface_key(phantom)
     paths = [cache / "curves" / shape / f"{job.key(shape, specimen, fineness)}.npz" for job in jobs]
     missing = [k for k, path in enumerate(paths) if _load(path) is None]
     if missing:

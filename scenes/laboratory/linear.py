@@ -15,7 +15,7 @@ import numpy as np
 from palpate.mechanics.elastic.partial_factor import partial_factor
 from palpate.scenes.laboratory.contact import Grip, SphereContact
 from palpate.scenes.laboratory.solid import Solid
-from palpate.scenes.laboratory.solver import LabError
+from palpate.scenes.laboratory.solver import Driven
 from palpate.scenes.laboratory.touching import Assembly, Touching
 
 
@@ -33,8 +33,10 @@ class LinearState:
     memory: np.ndarray
 
 
-class LinearProblem:
-    """Drives a sphere along a path on the condensed object; the same calls as `solver.Problem`."""
+class LinearProblem(Driven):
+    """Drives a sphere along a path on the condensed object."""
+
+    LOSES_HOLD, HALVED = 3, 9
 
     def __init__(
         self,
@@ -53,37 +55,12 @@ class LinearProblem:
         self._prony = solid.material.prony
 
     def rest(self, centre: np.ndarray) -> LinearState:
-        """The untouched object with the tip's centre at `centre`."""
         untouched = np.zeros(len(self._compliance))
         memory = np.zeros((len(self._prony), len(untouched)))
         grip = self._touching.contact.start(centre)
         return LinearState(untouched, np.asarray(centre, float), np.zeros(3), grip, 0.0, memory)
 
-    def advance(
-        self, state: LinearState, centre: np.ndarray, step_s: float = 0.0, depth: int = 0
-    ) -> LinearState:
-        """Move the tip's centre to `centre` within `step_s` seconds, 0 for infinitely slow.
-
-        The step is halved where the contact does not settle.
-        A sticking tip that finds no equilibrium in an eighth of a step loses its hold.
-        """
-        centre = np.asarray(centre, float)
-        found = self._step(state, centre, step_s)
-        if found is not None:
-            return found
-        if depth == 3 and self._touching.contact.friction < 0.0 and state.grip.active.any():
-            found = self._pressed_anew(state, centre, step_s)
-            if found is not None:
-                return found
-        if depth >= 9:
-            raise LabError(
-                f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep"
-            )
-        middle = self.advance(state, (state.centre + centre) / 2, step_s / 2, depth + 1)
-        return self.advance(middle, centre, step_s / 2, depth + 1)
-
     def _pressed_anew(self, state: LinearState, centre: np.ndarray, step_s: float) -> LinearState | None:
-        """The tip has lost its hold: the dragged surface springs back and meets it afresh at `centre`."""
         contact = self._touching.contact
         away = contact.clear_of(centre, state.grip)
         found: LinearState | None = LinearState(
@@ -117,5 +94,4 @@ class LinearProblem:
         return LinearState(found.u, centre, found.force, found.grip, energy, memory)
 
     def tip_stiffness(self, state: LinearState) -> np.ndarray:
-        """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative."""
         return self._touching.tip_stiffness(self._compliance, state.displacement, state.centre, state.grip)

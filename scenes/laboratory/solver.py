@@ -7,7 +7,9 @@ nonlinearity, which is smooth, is left to iterate.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -26,17 +28,19 @@ class LabError(PalpateError):
     """A load step of the virtual laboratory found no equilibrium."""
 
 
+_MIXED = 4
+
+
 class Mixing:
     """Anderson's acceleration (1965) of a fixed-point iteration: the step that its last steps foretell."""
 
-    def __init__(self, most: int = 4) -> None:
-        self._most = most
+    def __init__(self) -> None:
         self._x: list[np.ndarray] = []
         self._g: list[np.ndarray] = []
 
     def __call__(self, x: np.ndarray, g: np.ndarray) -> np.ndarray:
         """The step to take from x where the iteration alone would step by g."""
-        self._x, self._g = [*self._x[-self._most :], x], [*self._g[-self._most :], g]
+        self._x, self._g = [*self._x[-_MIXED:], x], [*self._g[-_MIXED:], g]
         if len(self._x) == 1:
             return g
         dx, dg = np.diff(self._x, axis=0).T, np.diff(self._g, axis=0).T
@@ -56,8 +60,56 @@ class State:
     grip: Grip
 
 
+class Driven(ABC):
+    """A discrete problem whose tip is driven along a path. Its states are of its own kind, and tell centre
+    (3,) mm, force on the tip (3,) and stored energy, modulus 1.
+
+    LOSES_HOLD, HALVED: after so many halvings of a step a sticking tip loses its hold, and none is tried any
+    more.
+    """
+
+    LOSES_HOLD: int
+    HALVED: int
+    _touching: Touching
+
+    @abstractmethod
+    def rest(self, centre: np.ndarray) -> Any:
+        """The untouched object with the tip's centre at `centre` (3,) mm."""
+
+    @abstractmethod
+    def tip_stiffness(self, state: Any) -> np.ndarray:
+        """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative."""
+
+    @abstractmethod
+    def _step(self, state: Any, centre: np.ndarray, step_s: float) -> Any:
+        """The state with the tip's centre there, step_s later; None where there is no equilibrium."""
+
+    @abstractmethod
+    def _pressed_anew(self, state: Any, centre: np.ndarray, step_s: float) -> Any:
+        """The tip has lost its hold: the dragged surface springs back and meets it afresh at `centre`."""
+
+    def advance(self, state: Any, centre: np.ndarray, step_s: float = 0.0, depth: int = 0) -> Any:
+        """Move the tip's centre to `centre` within `step_s` seconds, 0 for infinitely slow; the step is
+        halved where it finds no equilibrium. Raises LabError."""
+        centre = np.asarray(centre, float)
+        found = self._step(state, centre, step_s)
+        if found is not None:
+            return found
+        sticks = self._touching.contact.friction < 0.0 and state.grip.active.any()
+        if depth == self.LOSES_HOLD and sticks:
+            found = self._pressed_anew(state, centre, step_s)
+            if found is not None:
+                return found
+        if depth >= self.HALVED:
+            raise LabError(
+                f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep"
+            )
+        middle = self.advance(state, (state.centre + centre) / 2, step_s / 2, depth + 1)
+        return self.advance(middle, centre, step_s / 2, depth + 1)
+
+
 @dataclass
-class Problem:
+class Problem(Driven):
     """A solid on its support and a sphere; built once for a site, then driven along paths.
 
     free: (3 n,) bool, degrees of freedom that may move. springs: (3 n,) support stiffness on the diagonal;
@@ -70,6 +122,7 @@ class Problem:
     springs: np.ndarray | None = None
     floor: np.ndarray | None = None
     tolerance: float = 1e-4
+    LOSES_HOLD, HALVED = 2, 5
 
     def __post_init__(self) -> None:
         self._assembly = Assembly(self.solid.mesh.cells, self.free, self.springs)
@@ -79,39 +132,16 @@ class Problem:
         self._kept = np.flatnonzero(self.free)[self._touching.kept]
 
     def rest(self, centre: np.ndarray) -> State:
-        """The untouched object with the tip's centre at `centre`."""
         self._compliance = None
         u = np.zeros_like(self.solid.mesh.points)
         grip = self._touching.contact.start(centre)
         return State(u, np.asarray(centre, float), np.zeros(3), 0.0, self.solid.new_history(), grip)
 
-    def advance(self, state: State, centre: np.ndarray, step_s: float = 0.0, depth: int = 0) -> State:
-        """Move the tip's centre to `centre` within `step_s` seconds; halves the step where Newton fails.
-
-        A sticking tip that finds no equilibrium in a quarter of a step loses its hold.
-        """
-        centre = np.asarray(centre, float)
-        found = self._newton(state, centre, step_s)
-        if found is not None:
-            return found
-        if depth == 2 and self.contact.friction < 0.0 and state.grip.active.any():
-            found = self._pressed_anew(state, centre, step_s)
-            if found is not None:
-                return found
-        if depth >= 5:
-            raise LabError(
-                f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep or "
-                f"refine the mesh"
-            )
-        middle = self.advance(state, (state.centre + centre) / 2, step_s / 2, depth + 1)
-        return self.advance(middle, centre, step_s / 2, depth + 1)
-
     def _pressed_anew(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
-        """The tip has lost its hold: the dragged surface springs back and meets it afresh at `centre`."""
         away = self._touching.contact.clear_of(centre, state.grip)
         found: State | None = replace(self.rest(away), history=state.history)
         for share in np.linspace(0, 1, 1 + int(np.ceil(np.linalg.norm(away - centre) / 0.5))):
-            found = found and self._newton(found, away + share * (centre - away), step_s)
+            found = found and self._step(found, away + share * (centre - away), step_s)
             step_s = 0.0
         return found
 
@@ -125,7 +155,7 @@ class Problem:
         self._compliance = np.linalg.inv(self._factor.refresh(self._assembly.stiffness(elements)))
         return self._compliance
 
-    def _newton(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
+    def _step(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
         held, u, kept = state.grip.copy(), state.displacement, self._touching.kept
         known, mixing = self._compliance, Mixing()
         elements, _, energy, history = self.solid.evaluate(u, state.history, step_s, False)

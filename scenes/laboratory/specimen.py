@@ -11,16 +11,15 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 
 from palpate.scenes.laboratory.contact import SphereContact
 from palpate.scenes.laboratory.field import Field, ratio_at
 from palpate.scenes.laboratory.linear import LinearProblem
-from palpate.scenes.laboratory.mesh import QuadraticMesh, graded_mesh, surface_key
+from palpate.scenes.laboratory.mesh import QuadraticMesh, graded_mesh
 from palpate.scenes.laboratory.solid import Material, Solid
-from palpate.scenes.laboratory.solver import Problem
+from palpate.scenes.laboratory.solver import Driven, Problem
 from palpate.scenes.laboratory.surface import Surface
 from palpate.scenes.phantoms import Phantom
 
@@ -92,31 +91,6 @@ class Fineness:
     finest: float = 3.0
     reach: float = 5.0
     growth: float = 0.7
-
-
-class Equilibrium(Protocol):
-    """What every solver's state tells: the force on the tip (3,) and the stored energy, modulus 1, mm."""
-
-    @property
-    def force(self) -> np.ndarray:
-        """(3,)."""
-
-    @property
-    def energy(self) -> float:
-        """Of the whole solid."""
-
-
-class Driven(Protocol):
-    """A discrete problem whose tip is driven along a path; its states are its own kind, nobody else's."""
-
-    def rest(self, centre: np.ndarray) -> Equilibrium:
-        """The untouched object with the tip's centre at `centre` (3,) mm."""
-
-    def advance(self, state: Any, centre: np.ndarray, step_s: float = 0.0) -> Equilibrium:
-        """Move the tip's centre within `step_s` seconds, 0 for infinitely slow."""
-
-    def tip_stiffness(self, state: Any) -> np.ndarray:
-        """(3, 3) d(force on the tip) / d(tip position)."""
 
 
 def build(
@@ -223,8 +197,3 @@ def _support(
     floor = np.zeros((len(mesh.points), 3))
     floor[loose, 2] = FLOOR * area[loose]
     return ~np.repeat(bonded & ~loose, 3), None, floor.ravel()
-
-
-def phantom_key(phantom: Phantom) -> str:
-    """Content key of the shape alone: regions enter through the specimen."""
-    return surface_key(phantom)

@@ -31,7 +31,6 @@ from palpate.words import mm
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
 _BEYOND = 1e15
-_MODULUS = ("relaxationmodulus", "modulus", "g", "e")
 
 
 def read_tests(

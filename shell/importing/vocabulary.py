@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 _AXES = {"x": "x|0", "y": "y|1", "z": "z|2"}
-_Q_AXES = "wxyz"
 
 
 @lru_cache(maxsize=1)

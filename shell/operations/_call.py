@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.result import plain
 from palpate.output import Output, progress_bar
 
 _LOG = logging.getLogger("palpate").getChild("progress")
@@ -71,7 +72,7 @@ class Call:
             yield _logged(label, silent)
 
     def answer(self, result: Any) -> int:
-        """What a command does with the result; its exit code. A result says itself by `lines` and `as_json`;
+        """What a command does with the result; its exit code. A result says itself by `lines` and `plain`;
         text is its own line, and None is nothing to say."""
         if result is None:
             return 0
@@ -83,7 +84,7 @@ class Call:
             self._say(result.lines() if says else [result] if isinstance(result, str) else [])
         self._say(self.steps)
         self._say(next_lines(result) if self.following is None else self.following)
-        figures = {**(result.as_json() if says else {}), **self.figures}
+        figures = {**(plain(result) if says else {}), **self.figures}
         self.out.json(labelled(self.command, figures))
         return self.exit_code() if callable(self.exit_code) else self.exit_code
 

@@ -8,9 +8,10 @@ import os
 import time
 import uuid
 from concurrent.futures import CancelledError, Future, InvalidStateError, ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import psutil
 
@@ -24,7 +25,7 @@ _SHARE = 0.9
 _AHEAD = 2, 32
 """Jobs that Dask is given at once, so many a thread of its workers and so many more: none of them waits for
 this process, also where they are short."""
-_CONNECT_S, _COUNT_S = 10.0, 2.0
+_CONNECT_S, _COUNT_S, _PATIENCE_S = 10.0, 2.0, 900.0
 
 
 class Engine(Protocol):
@@ -39,16 +40,13 @@ class Engine(Protocol):
         """Do a job (`Task.job`); the lower its order, the sooner. It is cancelled where it was lost."""
 
 
-class LocalEngine:
+class LocalEngine(AbstractContextManager["LocalEngine"]):
     """Use as `with LocalEngine(workers) as engine`; leaving the block kills what still runs."""
 
     def __init__(self, workers: int | None = None, memory_bytes: int | None = None) -> None:
         self.workers = workers or cores()
         self.memory_bytes: int | None = memory_bytes or int(_SHARE * available_bytes())
         self._run, self._threads = uuid.uuid4().hex, ThreadPoolExecutor(self.workers)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)
@@ -63,23 +61,20 @@ class LocalEngine:
         return self._threads.submit(in_own_process, job, self._run)
 
 
-class DaskEngine:
+class DaskEngine(AbstractContextManager["DaskEngine"]):
     """Use as `with DaskEngine(address) as engine`; leaving the block ends what still runs.
 
-    address: of the scheduler, "tcp://HOST:PORT". patience_s: how long a scheduler that went away is waited
-    for. Raises OptionError where Dask is not installed or no scheduler answers.
+    address: of the scheduler, "tcp://HOST:PORT". Raises OptionError where Dask is not installed or no
+    scheduler answers.
     """
 
     memory_bytes: int | None = None
 
-    def __init__(self, address: str, patience_s: float = 900.0) -> None:
-        self.address, self.patience_s, self._run = address, patience_s, uuid.uuid4().hex
+    def __init__(self, address: str) -> None:
+        self.address, self._run = address, uuid.uuid4().hex
         self._given: dict[Future[Answer], Any] = {}
         self._threads, self._counted_at = 0, -_COUNT_S
         self._client = self._connected(_CONNECT_S)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         with contextlib.suppress(Exception):  # a scheduler that is gone holds nothing of ours
@@ -107,7 +102,7 @@ class DaskEngine:
     def _connect_again(self) -> None:
         """Wait for a scheduler that went away; what it had is lost."""
         self._client.close(timeout=2)
-        self._client = self._connected(self.patience_s)
+        self._client = self._connected(_PATIENCE_S)
         for future in list(self._given):
             future.cancel()
 

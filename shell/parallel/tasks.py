@@ -23,7 +23,7 @@ from palpate.mechanics.disk.reading import sha256_of_file
 from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.disk.writing import atomic_file
 from palpate.mechanics.errors import PalpateError
-from palpate.output import plain
+from palpate.mechanics.result import plain
 from palpate.version import __version__
 
 Answer = dict[str, Any]

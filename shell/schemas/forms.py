@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from palpate.mechanics.disk.schema import FileKey, Listed, Named, Schema
@@ -45,9 +45,15 @@ def either(*forms: Form) -> Form:
     return {"anyOf": list(forms)}
 
 
-def table(needed: Mapping[str, Form], **sometimes: Form) -> Form:
-    """An object with these keys, and those that are there sometimes. Further keys may join."""
-    return {"type": "object", "properties": {**needed, **sometimes}, "required": list(needed)}
+class Sometimes(Form):
+    """The form of a key that is not always there."""
+
+
+def table(**keys: Form) -> Form:
+    """An object with these keys, all of them there but for those that are `Sometimes`. Further keys may
+    join."""
+    needed = [name for name, form in keys.items() if not isinstance(form, Sometimes)]
+    return {"type": "object", "properties": keys, "required": needed}
 
 
 MAYBE = or_null(NUMBER)

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 from collections.abc import Mapping as MappingType
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Self
 
@@ -32,7 +33,7 @@ STOP_TIMEOUT_S = 5.0
 BEAT_S = 0.1
 
 
-class Servo:
+class Servo(AbstractContextManager["Servo"]):
     """A servo process as an object; use it in a `with` statement.
 
     model: a Model, a MODEL folder, or a RendererSource. device: a name or a DeviceChoice, made in the servo
@@ -256,9 +257,6 @@ class Servo:
         self._block.forget()
         if self._folder is not None:
             self._folder.close()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *error: object) -> None:
         self.close()

@@ -64,10 +64,6 @@ class Histogram:
         return min(lower_edge_ns(index + 1), self.greatest_ns) / 1000.0
 
     def as_json(self) -> dict[str, float]:
-        """What `summary` gives."""
-        return self.summary()
-
-    def summary(self) -> dict[str, float]:
         """median, p99, p99.9, max and mean in microseconds."""
         return {
             "median": self.quantile_us(0.5),

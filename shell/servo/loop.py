@@ -125,31 +125,22 @@ def warm_up(renderer: Any, state: Any, places: int = 100) -> None:
 
 
 class ServoLoop:
-    """The loop's thread and what it runs. `ticked` is set after each tick where the loop runs in Python."""
+    """The loop's thread and what it runs, `program`. `ticked` is set after each tick where the loop runs in
+    Python; wake_descriptor: readable after each tick (Linux), else -1."""
 
     def __init__(self, program: Program, arrays: TickArrays, *, on_start: Any = None) -> None:
         self.arrays = arrays
-        self._program = program
+        self.program = program
         self._pending: Program | None = None
         self._swapped = threading.Event()
         self._on_start = on_start
         self.ticked = threading.Event()
-        self._wake = os.eventfd(0, os.EFD_NONBLOCK) if COMPILED else -1
+        self.wake_descriptor = os.eventfd(0, os.EFD_NONBLOCK) if COMPILED else -1
         self._thread = threading.Thread(target=self._run, name="servo loop", daemon=True)
-
-    @property
-    def program(self) -> Program:
-        """What runs now."""
-        return self._program
-
-    @property
-    def wake_descriptor(self) -> int:
-        """Readable after each tick (Linux), else -1."""
-        return self._wake
 
     def start(self, first_deadline_ns: int | None = None) -> None:
         """Begin ticking, a period from now."""
-        period = self._program.parameters.period_ns
+        period = self.program.parameters.period_ns
         self.arrays.shared.counts[DEADLINE] = first_deadline_ns or time.perf_counter_ns() + 2 * period
         self.arrays.shared.counts[STATUS] = 1
         self._thread.start()
@@ -172,11 +163,11 @@ class ServoLoop:
                 self._on_start()
             while self.arrays.shared.control[STOP] == 0:
                 if self._pending is not None:
-                    self._program, self._pending = self._pending, None
+                    self.program, self._pending = self._pending, None
                     self.arrays.shared.control[SWAP] = 0
                     self._swapped.set()
                 if COMPILED:
-                    scene, kernel, loop, state, parameters = self._program
+                    scene, kernel, loop, state, parameters = self.program
                     loop(
                         kernel,
                         scene.renderer.parameters,
@@ -184,11 +175,11 @@ class ServoLoop:
                         scene.support,
                         self.arrays,
                         parameters,
-                        self._wake,
+                        self.wake_descriptor,
                         np.iinfo(np.int64).max,
                     )
                 else:
-                    portable_tick(self._program, self.arrays)
+                    portable_tick(self.program, self.arrays)
                     self.ticked.set()
         finally:
             self.arrays.shared.counts[STATUS] = 0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from palpate.devices.safety import WORDS, reason_words
-from palpate.output import plain
+from palpate.mechanics.result import plain
 from palpate.render.passivity import DISSIPATED, LEAST
 from palpate.servo.histogram import Histogram
 from palpate.servo.layout import (
@@ -72,7 +72,7 @@ class ServoReport:
 
     def text(self, *, sent: bool = True) -> str:
         """In lines. sent: whether there was a device to send a force to."""
-        c, late = self.compute.summary(), self.lateness.summary()
+        c, late = self.compute.as_json(), self.lateness.as_json()
         lines = [
             f"{self.rate_hz:.0f} forces a second for {self.seconds:.1f} s: "
             f"{self.missed_ticks} skipped, {self.late_ticks} late",

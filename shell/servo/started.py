@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 from collections.abc import Sequence
-from typing import Self
+from contextlib import AbstractContextManager
 
 from palpate.child import module_command
 from palpate.servo.layout import SharedBlock
 
 
-class StartedServo:
+class StartedServo(AbstractContextManager["StartedServo"]):
     """The process and the block that it shares with this one; it waits for its job on its input.
 
     stages: of palpate.warm_up, which it does before that; a failure there costs only time. Use it in a `with`
@@ -33,9 +33,6 @@ class StartedServo:
         """The process, whose end is the caller's task from now on."""
         self.taken = True
         return self.process
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *error: object) -> None:
         if self.taken:

@@ -7,6 +7,7 @@ A module has those of these that its result needs:
     KEYS                                   of the command's --json (`story.Key`)
     draw(result, ax)                       the one plot
     place(result, plotter)                 into a 3D scene, device frame, m
+    SHOWN_AS                               the attribute that is drawn and placed where these are absent
     view(result) -> View | None            the object to be turned, in pages and notebooks
     save(result, path)                     what reads it back, where its own class does not write it
 
@@ -83,10 +84,13 @@ def _loaded(name: str) -> ModuleType:
 
 
 def _function(result: Result, name: str, words: str) -> Any:
-    found = getattr(_module_of(result), name, None)
-    if found is None:
-        raise OptionError(f"a {type(result).__name__} has no {words}")
-    return found
+    module = _module_of(result)
+    if (found := getattr(module, name, None)) is not None:
+        return found
+    if name in ("draw", "place") and (part := getattr(module, "SHOWN_AS", "")):
+        shown = getattr(result, part)
+        return lambda _, canvas: _function(shown, name, words)(shown, canvas)
+    raise OptionError(f"a {type(result).__name__} has no {words}")
 
 
 def story_of(result: Result, **more: Any) -> Story:

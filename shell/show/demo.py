@@ -14,7 +14,6 @@ from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.steps.s6_one_d import low_passed
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.servo.report import ServoReport
-from palpate.show import model as made
 from palpate.show import story as say
 from palpate.show.colours import COLOURS
 from palpate.show.diagnosis.gaps import known
@@ -28,12 +27,10 @@ from palpate.show.view3d import Colouring, Line, View
 from palpate.words import begun, force_words, kpa, mn, spoken, sure_kpa
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from pyvista import Plotter
 
 
-__all__ = ["KEYS", "draw", "place", "story", "view"]
+SHOWN_AS = "reconstruction"
 _STAGES = {
     "reconstruct": "from the recording to the model",
     "precompute": "the compliance of every place",
@@ -131,19 +128,9 @@ def diagnosis_json(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
     return {key: whole[key] for key in _DIAGNOSIS}
 
 
-def draw(result: DemoResult, ax: Axes) -> None:
-    """Force over time with the touches that were found."""
-    force_over_time(ax, result.reconstruction.exploration)
-
-
-def place(result: DemoResult, plotter: Plotter) -> None:
-    """The model."""
-    made.place(result.model, plotter)
-
-
 def _loop(servo: ServoReport) -> list[list[str]]:
     """What the loop did, in words."""
-    compute = servo.compute.summary()
+    compute = servo.compute.as_json()
     return [
         ["forces given", f"{servo.ticks} in {servo.seconds:.1f} s"],
         ["skipped, since the machine was busy", str(servo.missed_ticks)],

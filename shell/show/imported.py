@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from palpate.importing.imported import Imported
-from palpate.show import recording as measured
 from palpate.show import story as say
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from pyvista import Plotter
+SHOWN_AS = "recording"
 
 
 def story(result: Imported) -> say.Story:
@@ -39,13 +34,3 @@ KEYS: tuple[say.Key, ...] = (
     ),
     "notes=understood.notes",
 )
-
-
-def draw(result: Imported, ax: Axes) -> None:
-    """Force over time."""
-    measured.draw(result.recording, ax)
-
-
-def place(result: Imported, plotter: Plotter) -> None:
-    """The tip's path, coloured by force."""
-    measured.place(result.recording, plotter)

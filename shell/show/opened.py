@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from palpate.importing.kinds import Opened
 from palpate.operations._written import import_words, open_words
@@ -11,9 +10,7 @@ from palpate.show import story as say
 from palpate.show import story_of
 from palpate.show.page import feel_step, file_words
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from pyvista import Plotter
+SHOWN_AS = "result"
 
 
 def story(result: Opened) -> say.Story:
@@ -69,13 +66,3 @@ KEYS: tuple[say.Key, ...] = (
     "odds",
     "result",
 )
-
-
-def draw(result: Opened, ax: Axes) -> None:
-    """The result's plot."""
-    result.result.plot(ax)
-
-
-def place(result: Opened, plotter: Plotter) -> None:
-    """The result in space."""
-    result.result.show(plotter)

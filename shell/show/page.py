@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.disk.writing import PNG, Kind, atomic_file
-from palpate.output import plain
+from palpate.mechanics.result import plain
 from palpate.show.colours import style_sheet
 from palpate.show.glossary import Terms
 from palpate.show.story import (

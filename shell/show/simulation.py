@@ -9,7 +9,6 @@ import numpy as np
 from palpate.mechanics.frames import tangents
 from palpate.scenes.laboratory.paths import SIDEWAYS
 from palpate.scenes.laboratory.simulate import Simulation
-from palpate.show import recording as measured
 from palpate.show import story as say
 from palpate.show.colours import COLOURS
 from palpate.show.page import file_words, new_figure
@@ -18,11 +17,9 @@ from palpate.show.view3d import Colouring, Line, Thing, Traces, View
 from palpate.words import kpa, listed, mn, spaced
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from pyvista import Plotter
 
-
+SHOWN_AS = "recording"
 PRESSES_SHOWN = 7
 """Presses whose curves are drawn: more would hide one another."""
 
@@ -87,16 +84,6 @@ KEYS: tuple[say.Key, ...] = (
     ("palpations", lambda result: len(result.touches)),
     "truth",
 )
-
-
-def draw(result: Simulation, ax: Axes) -> None:
-    """Force over time."""
-    measured.draw(result.recording, ax)
-
-
-def place(result: Simulation, plotter: Plotter) -> None:
-    """The tip's path, coloured by force."""
-    measured.place(result.recording, plotter)
 
 
 def view(result: Simulation) -> View:

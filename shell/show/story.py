@@ -23,12 +23,12 @@ printer comes to it, so that a terminal waits for no picture.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from palpate.output import plain
+from palpate.mechanics.result import Key as Key
+from palpate.mechanics.result import figures_of as figures_of
 
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
@@ -195,21 +195,3 @@ def _padded(cell: str, width: int, column: int) -> str:
 def steps_of(story: Story) -> list[str]:
     """What to do with a result."""
     return [step for block in story if isinstance(block, Next) and block.on != PAGE for step in block.steps]
-
-
-Key = str | tuple[str, Callable[[Any], Any]] | Callable[[Any], Mapping[str, Any]]
-"""Of JSON: a field's name, 'key=path.of.fields', (key, function), or a function that gives several."""
-
-
-def figures_of(result: Any, keys: Iterable[Key]) -> dict[str, Any]:
-    """The JSON of a result."""
-    found: dict[str, Any] = {}
-    for key in keys:
-        if isinstance(key, str):
-            name, _, path = key.partition("=")
-            found[name] = attrgetter(path or name)(result)
-        elif isinstance(key, tuple):
-            found[key[0]] = key[1](result)
-        else:
-            found |= key(result)
-    return plain(found)

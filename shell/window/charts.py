@@ -24,26 +24,25 @@ from palpate.window.lettering import set_type
 
 
 class ForceTrace:
-    """Rows of (time s, force N, depth m, second renderer's force N), the newest `seconds` of them."""
+    """Rows of (time s, force N, depth m, second renderer's force N), the newest SECONDS of them."""
 
-    COLUMNS = 4
+    COLUMNS, SECONDS = 4, 6.0
+    _MOST = 7200  # rows, a fifth more than come at 1 kHz
 
-    def __init__(self, seconds: float = 6.0, rate_hz: float = 1000.0) -> None:
-        self.seconds = seconds
+    def __init__(self) -> None:
         self._rows = np.zeros((0, self.COLUMNS))
-        self._most = int(seconds * rate_hz * 1.2)
 
     def add(self, rows: np.ndarray) -> None:
         """Append (n, 4) rows; old ones fall off."""
         if len(rows):
-            self._rows = np.vstack([self._rows, rows])[-self._most :]
+            self._rows = np.vstack([self._rows, rows])[-self._MOST :]
 
     def curves(self, points: int = 600) -> np.ndarray:
-        """(k, 4) at most `points` rows; time counts from now, so that it runs from -seconds to 0."""
+        """(k, 4) at most `points` rows; time counts from now, so that it runs from -SECONDS to 0."""
         rows = self._rows
         if not len(rows):
             return np.zeros((0, self.COLUMNS))
-        rows = rows[rows[:, 0] > rows[-1, 0] - self.seconds]
+        rows = rows[rows[:, 0] > rows[-1, 0] - self.SECONDS]
         shown = rows[:: max(1, len(rows) // points)].copy()
         shown[:, 0] -= rows[-1, 0]
         return shown

@@ -85,7 +85,8 @@ WHAT = {
 
 
 class Guide:
-    """Call `follow` at every frame; read `ghost` and `lines`.
+    """Call `follow` at every frame; read `ghost` and `lines`. suggestion, state: what to do next and what is
+    known, by all that was taken in; touched: (p, 3) m, where the presses that were understood met the object.
 
     model: what is felt; of it only how far its foot has been gone round is read, and where the support is.
     """
@@ -101,24 +102,14 @@ class Guide:
         self._rows: list[np.ndarray] = []
         self._first: int | None = None
         self._last_touch: int | None = None
-        self._suggestion: Suggestion = explorer.suggest()
-        self._state: ExplorationState = explorer.state
-        self._touched = np.zeros((0, 3))
-
-    @property
-    def suggestion(self) -> Suggestion:
-        """What to do next, by all that was taken in."""
-        return self._suggestion
-
-    @property
-    def state(self) -> ExplorationState:
-        """What is known, by all that was taken in."""
-        return self._state
+        self.suggestion: Suggestion = explorer.suggest()
+        self.state: ExplorationState = explorer.state
+        self.touched = np.zeros((0, 3))
 
     @property
     def ghost(self) -> Ghost | None:
         """The press that is suggested; None where it is something else, or where one is being thought of."""
-        s = self._suggestion
+        s = self.suggestion
         if s.kind != "press" or s.point is None or s.normal is None:
             return None
         return Ghost(s.point + self._servo.tip_radius_m * s.normal, -s.normal, s.depth_m)
@@ -127,11 +118,6 @@ class Guide:
     def foot(self) -> tuple[np.ndarray, np.ndarray]:
         """(k, 3) m, points along the foot, and (k,) whether they were gone round."""
         return self._tracing.foot
-
-    @property
-    def touched(self) -> np.ndarray:
-        """(p, 3) m, where a press met the object, of those that were understood."""
-        return self._touched
 
     def follow(self) -> None:
         """Take over the servo's newest ticks; hand a segment over where one has ended."""
@@ -146,7 +132,7 @@ class Guide:
             self._first = int(rows["tick"][touching[0]]) if self._first is None else self._first
             self._last_touch = int(rows["tick"][touching[-1]])
         rate = self._servo.options.rate_hz
-        if self._suggestion.kind == "free" and self._first is None:
+        if self.suggestion.kind == "free" and self._first is None:
             if sum(map(len, self._rows)) > WAVED_S * rate:
                 self._take_in()
             return
@@ -164,7 +150,7 @@ class Guide:
     @property
     def _still_tracing(self) -> bool:
         """Whether the base was not all gone round yet, or not so that it was understood."""
-        return self._suggestion.kind in ("trace", "retrace")
+        return self.suggestion.kind in ("trace", "retrace")
 
     def _take_in(self) -> None:
         rows, self._rows = np.concatenate(self._rows), []
@@ -182,14 +168,14 @@ class Guide:
         self.explorer.segments.append(segment)
         self.explorer.bring_up_to_date()
         self.explorer.save(self._path)
-        self._state, self._suggestion = self.explorer.state, self.explorer.suggest()
+        self.state, self.suggestion = self.explorer.state, self.explorer.suggest()
         if (found := self.explorer.estimate.exploration) is not None:
-            self._touched = found.presses.point
-        if self._suggestion.kind == "retrace":
+            self.touched = found.presses.point
+        if self.suggestion.kind == "retrace":
             self._tracing = BaseTracing(self._model)
 
     def _kind(self, rows: np.ndarray) -> str:
-        asked = self._suggestion.kind
+        asked = self.suggestion.kind
         touched = np.linalg.norm(rows["rendered"], axis=1) > TOUCHING_N
         height = self._support.height(rows["tip"][touched])
         if asked == "rigid" and height.size and height.max() < ON_IT * self._servo.tip_radius_m:
@@ -200,7 +186,7 @@ class Guide:
 
     def lines(self) -> list[str]:
         """For the panel: what to do, in one sentence, and what is known."""
-        s, state = self._suggestion, self._state
+        s, state = self.suggestion, self.state
         why = state.trouble.split(" (")[0].split(":")[0]
         known = f"no shape yet: {why}" if why else "nothing is known yet"
         if state.surface:

@@ -6,19 +6,18 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pyvista
 from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from palpate.scenes.phantoms import Region
-from palpate.window.game import Game
-from palpate.window.keys import KEYS, Orbit
-from palpate.window.pointer import Pointer
-from palpate.window.session import MODULUS_STEP, TouchSession
-from palpate.window.widgets import Board
+from palpate.window.keys import KEYS
+from palpate.window.session import MODULUS_STEP
+
+if TYPE_CHECKING:
+    from palpate.window.window import TouchWindow
 
 INCLUSION_RADIUS_M = 0.008
 INCLUSION_RATIO = 8.0
@@ -42,44 +41,10 @@ NAMES = {
 """Key symbols that do what another does."""
 
 
-class Controlled(Protocol):
-    """What the controls need of a window."""
-
-    session: TouchSession
-    plotter: pyvista.Plotter
-    pointer: Pointer
-    orbit: Orbit
-    game: Game | None
-    boards: list[Board]
-    notice: str
-    aside: str
-    more: bool
-
-    @property
-    def guided(self) -> bool:
-        """Whether an exploration is guided: what is explored is left as it is."""
-
-    @property
-    def picture_renderers(self) -> list[vtkRenderer]:
-        """Where an object is drawn."""
-
-    def toggle_colour(self) -> None:
-        """By displacement, or by local stiffness."""
-
-    def show_aside(self, which: str) -> None:
-        """Settings ('s') or help ('h') beside the pictures; those that are open close."""
-
-    def answer(self) -> None:
-        """The game's: the nodule is here."""
-
-    def close(self, *, scenes: bool = False) -> None:
-        """End; scenes: to choose another."""
-
-
 class Controls:
     """Listens to a window's interactor; every method may also be called by a script."""
 
-    def __init__(self, window: Controlled) -> None:
+    def __init__(self, window: TouchWindow) -> None:
         self._window = window
         self._session = window.session
         self._dragged: tuple[np.ndarray, np.ndarray] | None = None
@@ -235,19 +200,12 @@ class Controls:
 
     def _actions(self) -> dict[str, Callable[[], object]]:
         session, window = self._session, self._window
-
-        def stiffer() -> None:
-            session.scale_modulus(MODULUS_STEP)
-
-        def softer() -> None:
-            session.scale_modulus(1.0 / MODULUS_STEP)
-
         return {
             "space": session.toggle_force,
             "Tab": session.next_renderer,
             "b": session.toggle_beside,
-            "plus": stiffer,
-            "minus": softer,
+            "plus": lambda: session.scale_modulus(MODULUS_STEP),
+            "minus": lambda: session.scale_modulus(1.0 / MODULUS_STEP),
             "bracketleft": lambda: window.pointer.deeper(-1),
             "bracketright": lambda: window.pointer.deeper(1),
             "v": window.orbit.reset,

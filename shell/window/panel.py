@@ -5,20 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from palpate.render.registry import names
-from palpate.scenes.scene import Scene
 from palpate.show.colours import ACCENT, GREY, HINT, WARNING, colour_of
 from palpate.window.keys import KEYS, help_rows, shown
-from palpate.window.mouse_and_keys import Controlled, Controls
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
 from palpate.window.session import FRICTIONS, MODULUS_STEP, TouchSession
 from palpate.window.widgets import BODY, Item, Row
 from palpate.window.worker import Frame
 from palpate.words import begun, mm, renderer_words, spaced
+
+if TYPE_CHECKING:
+    from palpate.window.window import TouchWindow
 
 T = TypeVar("T")
 DRAGGED_M = 0.006
@@ -26,30 +27,10 @@ DEPTH = "press depth"
 """The slider's name."""
 
 
-class Shown(Controlled, Protocol):
-    """What stands beside the pictures of a window is read off it."""
-
-    scene: Scene
-    controls: Controls
-    aside: str
-    moved_by_mouse: bool
-
-    @property
-    def stiffness_drawn(self) -> bool:
-        """Whether the object is coloured by its stiffness."""
-
-    def next_words(self, frame: Frame) -> str:
-        """What to do next."""
-
-    @property
-    def known_words(self) -> str:
-        """What a guided exploration knows so far, '' without one."""
-
-
 class NextStep:
     """What a newcomer does next: each step is said until it was done, in this order."""
 
-    def __init__(self, window: Shown, *, mouse: bool) -> None:
+    def __init__(self, window: TouchWindow, *, mouse: bool) -> None:
         pointer, session, orbit = window.pointer, window.session, window.orbit
         depth, look = pointer.press_depth_m, orbit.azimuth
         self._began: np.ndarray | None = None
@@ -87,7 +68,7 @@ class NextStep:
         return self._steps[0][0] if self._steps else "Press anywhere. Settings changes what you feel."
 
 
-def main_rows(window: Shown, frame: Frame) -> list[Row]:
+def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
     """The column on the left."""
     session = window.session
     felt, *others = frame.views
@@ -119,7 +100,7 @@ def _where(frame: Frame) -> str:
     return "on the support" if any(np.linalg.norm(v.force_n) > 0.0 for v in frame.views) else "in air"
 
 
-def depth_rows(window: Shown) -> list[Row]:
+def depth_rows(window: TouchWindow) -> list[Row]:
     """How deep a press goes at most."""
     pointer = window.pointer
     low, high = 1e3 * LEAST_PRESS_M, 1e3 * MOST_PRESS_M
@@ -134,7 +115,7 @@ def depth_rows(window: Shown) -> list[Row]:
     ]
 
 
-def _buttons(window: Shown) -> list[Row]:
+def _buttons(window: TouchWindow) -> list[Row]:
     session, offered = window.session, window.controls.offered
     chosen = {
         "b": bool(session.beside_name),
@@ -163,7 +144,7 @@ def _buttons(window: Shown) -> list[Row]:
     return rows
 
 
-def _status(window: Shown, frame: Frame) -> list[Row]:
+def _status(window: TouchWindow, frame: Frame) -> list[Row]:
     """What goes on besides."""
     session, worker = window.session, window.session.worker
     rows: list[Row] = []
@@ -222,7 +203,7 @@ def _technical(words: str, value: object) -> str:
     return value if isinstance(value, str) and value not in ("", words) else ""
 
 
-def settings_rows(window: Shown) -> list[Row]:
+def settings_rows(window: TouchWindow) -> list[Row]:
     """The column on the right: everything that may be changed about what is felt."""
     session = window.session
 
@@ -257,7 +238,7 @@ def settings_rows(window: Shown) -> list[Row]:
     return rows
 
 
-def aside_rows(window: Shown) -> list[Row]:
+def aside_rows(window: TouchWindow) -> list[Row]:
     """What is open on the right."""
     heading = Item("Settings" if window.aside == "s" else "Help", size=16, bold=True, wide=3.0)
     close = Item("Close", do=lambda: window.show_aside(window.aside), size=12, wide=1.2)

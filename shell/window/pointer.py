@@ -40,7 +40,10 @@ class Target:
 
 
 class Pointer:
-    """Holds where the mouse points, whether it presses and how deep; `place` moves the tip for one frame."""
+    """Holds where the mouse points, whether it presses and how deep; `place` moves the tip for one frame.
+
+    tip_m: (3,) m, where the hand means the tip's centre to be.
+    """
 
     def __init__(
         self,
@@ -65,15 +68,10 @@ class Pointer:
         self.target: Target | None = None
         top = ((self._points - self._support_point) @ self._up).max() + 0.03
         middle = self._points.mean(axis=0)
-        self._tip = middle + (top - (middle - self._support_point) @ self._up) * self._up
+        self.tip_m = middle + (top - (middle - self._support_point) @ self._up) * self._up
         self._depth = -HOVER_M
         self._safe = top  # height over the support at which nothing is in the way
         self._travelling = False
-
-    @property
-    def tip_m(self) -> np.ndarray:
-        """(3,) m, where the hand means the tip's centre to be."""
-        return self._tip
 
     def point_along(self, near: np.ndarray, far: np.ndarray) -> Target | None:
         """What a ray from the eye meets first; None where it meets nothing (the target then stays)."""
@@ -99,7 +97,7 @@ class Pointer:
         its radius m, smaller in a thin object."""
         target = self.target
         if target is None or target.on_support:
-            point, normal = self._nearest(self._tip)
+            point, normal = self._nearest(self.tip_m)
         else:
             point, normal = target.point, target.normal
         thickness = self._thickness(point, normal)
@@ -126,11 +124,11 @@ class Pointer:
         """
         target = self.target
         if target is None:
-            return self._tip
-        if self._travelling and felt is not None and np.linalg.norm(felt - self._tip) > LEAP_M:
-            return self._tip
+            return self.tip_m
+        if self._travelling and felt is not None and np.linalg.norm(felt - self.tip_m) > LEAP_M:
+            return self.tip_m
         reach = MOST_SPEED_M_PER_S * duration_s
-        away = float(np.linalg.norm(self._centre(target, self._depth) - self._tip))
+        away = float(np.linalg.norm(self._centre(target, self._depth) - self.tip_m))
         self._travelling = away > (ARRIVED_M if self._travelling else LEAP_M)
         if self._travelling:
             self._depth = -HOVER_M
@@ -153,26 +151,26 @@ class Pointer:
         return self._beside(centre, self.radius + (CLEAR_M if depth_m < 0 else -LEAN_M))
 
     def _go(self, to: np.ndarray, reach_m: float) -> np.ndarray:
-        move = to - self._tip
+        move = to - self.tip_m
         distance = float(np.linalg.norm(move))
-        self._tip = self._tip + move * min(1.0, reach_m / max(distance, 1e-12))
-        return self._tip
+        self.tip_m = self.tip_m + move * min(1.0, reach_m / max(distance, 1e-12))
+        return self.tip_m
 
     def _way(self, goal: np.ndarray) -> np.ndarray:
         """The goal where the way there is free; else up, then across, until it is."""
         if self._free(goal):
             return goal
-        missing = self._safe - float((self._tip - self._support_point) @ self._up)
+        missing = self._safe - float((self.tip_m - self._support_point) @ self._up)
         if missing > ARRIVED_M:
-            return self._tip + missing * self._up
+            return self.tip_m + missing * self._up
         return goal + (self._safe - float((goal - self._support_point) @ self._up)) * self._up
 
     def _free(self, goal: np.ndarray) -> bool:
         """Whether the tip meets nothing on the straight way, but where that begins and ends."""
-        length = float(np.linalg.norm(goal - self._tip))
+        length = float(np.linalg.norm(goal - self.tip_m))
         steps = np.arange(1.5 * self.radius, length - 1.5 * self.radius, 0.5 * self.radius)
         for step in steps:
-            centre = self._tip + step / length * (goal - self._tip)
+            centre = self.tip_m + step / length * (goal - self.tip_m)
             closest, inside = self._closest(centre)
             if inside or np.linalg.norm(centre - closest) < self.radius:
                 return False

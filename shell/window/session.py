@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -57,8 +57,11 @@ class SessionOptions:
     pictures: bool = True
 
 
-class TouchSession:
-    """Use in a `with` statement, after which every force is zero and the servo is gone."""
+class TouchSession(AbstractContextManager["TouchSession"]):
+    """Use in a `with` statement, after which every force is zero and the servo is gone.
+
+    servo: its client. beside_name: the second renderer, '' for none. has_force: whether the device gives any.
+    """
 
     def __init__(
         self,
@@ -81,12 +84,12 @@ class TouchSession:
         self.recording: SessionRecording | None = None
         self._recording_path = asked.recording
         self._pictures = asked.pictures
-        self._beside_name = asked.beside
+        self.beside_name = asked.beside
         self._last_beside = asked.beside or BESIDE
         self._beside: Beside | None = None
         self._device = DeviceChoice(device) if isinstance(device, str) else device
-        self._has_force = spec_of(self._device.name).has_force
-        self._servo = Servo(
+        self.has_force = spec_of(self._device.name).has_force
+        self.servo = Servo(
             model,
             renderer=asked.renderer,
             device=self._device,
@@ -96,7 +99,7 @@ class TouchSession:
             coarse=True,
             started=started,
         )
-        self.table = SessionTable(self._servo, self._drawn, self.worker, self._follow_drawn)
+        self.table = SessionTable(self.servo, self._drawn, self.worker, self._follow_drawn)
         self._next = 0
 
     def start(self, progress: Progress = silent, *, compiled: Callable[[], object] = lambda: None) -> Self:
@@ -104,19 +107,19 @@ class TouchSession:
 
         compiled: see Servo.start.
         """
-        drawn = ({self._servo.renderer} if self._pictures else set()) | ({self._beside_name} - {""})
-        if "fem" in {self._servo.renderer, *drawn}:
+        drawn = ({self.servo.renderer} if self._pictures else set()) | ({self.beside_name} - {""})
+        if "fem" in {self.servo.renderer, *drawn}:
             # once, before two processes ask for it at the same time
             self.table.begin(self.model, lambda stage, share: progress(stage, 0.5 * share))
         with ThreadPoolExecutor(1) as pool:
             loading = [pool.submit(self._drawn.load, name) for name in sorted(drawn)]
-            self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share), compiled=compiled)
+            self.servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share), compiled=compiled)
             for job in loading:
                 job.result()
         self._drawn.know_stiffness()
         self._restart_beside()
         self._apply()
-        self._next = int(self._servo.arrays.ring_head[0])
+        self._next = int(self.servo.arrays.ring_head[0])
         if self._recording_path is not None:
             self.begin_recording(self._recording_path)
         progress("touching", 1.0)
@@ -129,25 +132,15 @@ class TouchSession:
     def _apply(self) -> None:
         """What the user changed, to a renderer that is new."""
         if self.young_modulus_pa != self.model.material.young_modulus_pa:
-            self._servo.set_modulus(self.young_modulus_pa)
+            self.servo.set_modulus(self.young_modulus_pa)
         if self.friction != rendered_touch(self.model, self._drawn.options).friction:
-            self._servo.set_friction(self.friction)
-        self._inclusion.apply(self._servo)
-
-    @property
-    def servo(self) -> Servo:
-        """The servo's client."""
-        return self._servo
+            self.servo.set_friction(self.friction)
+        self._inclusion.apply(self.servo)
 
     @property
     def renderer_name(self) -> str:
         """The renderer that the hand feels."""
-        return self._servo.renderer
-
-    @property
-    def beside_name(self) -> str:
-        """The second renderer, '' for none."""
-        return self._beside_name
+        return self.servo.renderer
 
     @property
     def young_modulus_pa(self) -> float:
@@ -160,23 +153,23 @@ class TouchSession:
 
     def enable(self) -> None:
         """Force on, ramping in."""
-        self._servo.enable()
+        self.servo.enable()
 
     def toggle_force(self) -> None:
         """Force off where it is on, on where it is off."""
-        snapshot = self._servo.snapshot()
-        (self._servo.disable if snapshot and snapshot.force_enabled else self._servo.enable)()
+        snapshot = self.servo.snapshot()
+        (self.servo.disable if snapshot and snapshot.force_enabled else self.servo.enable)()
 
     def frame(self) -> Frame | None:
         """The newest state for a picture; None before the first tick."""
-        rows, self._next = self._servo.history(self._next)
+        rows, self._next = self.servo.history(self._next)
         if self.recording is not None:
             self.recording.collect()
         beside = self._beside  # the worker may put another in its place
         sizes = np.zeros(len(rows)) if beside is None else beside.follow(rows["tip"])
         if not self._inclusion.settled and self.table.all_drawn:
             self.worker.offer("computing the ball", self._follow_inclusion)
-        snapshot = self._servo.snapshot()
+        snapshot = self.servo.snapshot()
         if snapshot is None:
             return None
         self._add_to_trace(rows, sizes)
@@ -192,7 +185,7 @@ class TouchSession:
             touching=bool(snapshot.touching[0]),
             stiffness_n_per_m=float(snapshot.stiffness[0]),
             force_enabled=snapshot.force_enabled,
-            reason=snapshot.reason if self._has_force else "",
+            reason=snapshot.reason if self.has_force else "",
             views=tuple(views),
             busy=self.worker.busy or self.worker.failure,
             table=self.table.words,
@@ -207,21 +200,21 @@ class TouchSession:
             snapshot.points[held],
             snapshot.normals[held],
             snapshot.forces_n[held],
-            np.full(len(held), self._servo.tip_radius_m),
+            np.full(len(held), self.servo.tip_radius_m),
             snapshot.depths[held],
         )
 
     def _restart_beside(self) -> None:
-        name = self._beside_name
+        name = self.beside_name
         if not name:
             self._beside = None
             return
         # the plane that is felt, which may be softer than the options' for the device's sake
-        scene = scene_of(self._drawn.load(name), self._servo.options.support_plane)
+        scene = scene_of(self._drawn.load(name), self.servo.options.support_plane)
         spec = spec_of(self._device.name)
         if spec.has_force:
             scene = scene.no_stiffer_than(spec.max_stiffness_n_per_m)
-        self._beside = Beside(name, scene, self._servo.tip_radius_m)
+        self._beside = Beside(name, scene, self.servo.tip_radius_m)
 
     def _add_to_trace(self, rows: np.ndarray, beside: np.ndarray) -> None:
         if not len(rows):
@@ -231,7 +224,7 @@ class TouchSession:
 
     def begin_recording(self, path: Path) -> None:
         """Record from now on; the file is written by `end_recording` or on close."""
-        self.recording = SessionRecording(self._servo, self.model, path)
+        self.recording = SessionRecording(self.servo, self.model, path)
 
     def end_recording(self) -> Path | None:
         """Write what was recorded with what is known of it; None where nothing was being recorded."""
@@ -266,7 +259,7 @@ class TouchSession:
         """Both processes load it at once; the old one is felt until then."""
         with ThreadPoolExecutor(1) as pool:
             drawing = pool.submit(self._drawn.load, name, self.worker.tell) if self._pictures else None
-            self._servo.set_renderer(name, self.worker.tell, options=self._drawn.options)
+            self.servo.set_renderer(name, self.worker.tell, options=self._drawn.options)
             if drawing is not None:
                 drawing.result()
         self._apply()
@@ -277,13 +270,13 @@ class TouchSession:
 
     def toggle_beside(self) -> None:
         """The second renderer of before, or none."""
-        self.set_beside("" if self._beside_name else self._last_beside)
+        self.set_beside("" if self.beside_name else self._last_beside)
 
     def _compare(self, name: str) -> None:
         if name:
             self._drawn.load(name, self.worker.tell)
             self._last_beside = name
-        self._beside_name = name
+        self.beside_name = name
         self._restart_beside()
 
     @property
@@ -296,9 +289,9 @@ class TouchSession:
 
         def job() -> None:
             self._drawn.options = replace(self._drawn.options, effects=on)
-            self._drawn.make_anew({self.renderer_name, self._beside_name} - {""}, self.worker.tell)
+            self._drawn.make_anew({self.renderer_name, self.beside_name} - {""}, self.worker.tell)
             self._feel_anew(self.renderer_name)
-            self._compare(self._beside_name)
+            self._compare(self.beside_name)
 
         self.worker.run("changing the effects", job)
 
@@ -306,11 +299,6 @@ class TouchSession:
     def feels_inside(self) -> bool:
         """Whether what is felt knows friction and the object's inside: one-dimensional models do not."""
         return self.renderer_name == "fem"
-
-    @property
-    def has_force(self) -> bool:
-        """Whether the device gives any."""
-        return self._has_force
 
     def reset_modulus(self) -> None:
         """As the model has it."""
@@ -321,10 +309,9 @@ class TouchSession:
 
         def job() -> None:
             modulus = self.young_modulus_pa * factor
-            self._servo.set_modulus(modulus)
+            self.servo.set_modulus(modulus)
             self._drawn.set_modulus(modulus)
-            if self._beside is not None:
-                self._beside.change(self._drawn.load(self._beside.name))
+            self._follow_drawn()
 
         self.worker.run("changing the modulus", job)
 
@@ -339,7 +326,7 @@ class TouchSession:
     def _set_friction(self, which: Callable[[], float]) -> None:
         def job() -> None:
             friction = which()
-            self._servo.set_friction(friction)
+            self.servo.set_friction(friction)
             self.friction = friction
 
         self.worker.run("changing friction", job)
@@ -362,33 +349,30 @@ class TouchSession:
         while not self._inclusion.settled:
             drawing = self._drawn.load("fem", self.worker.tell)
             assert isinstance(drawing, FemRenderer), "'fem' is made by palpate.render.fem.renderer"
-            changed = self._inclusion.follow(self._servo, drawing, self.worker.tell)
+            changed = self._inclusion.follow(self.servo, drawing, self.worker.tell)
             self._drawn.put("fem", changed)
             if self._beside is not None and self._beside.name == "fem":
                 self._beside.change(changed)
 
     def report(self) -> ServoReport:
         """What the servo did so far."""
-        return self._servo.report()
+        return self.servo.report()
 
     def close(self) -> None:
         """Force off, servo ended, recording written."""
-        self._servo.disable()
+        self.servo.disable()
         with ExitStack() as rest:  # all of it, from the last, though one fails
             for each in (
                 self._inclusion.close,
                 self.table.close,
-                self._servo.close,
+                self.servo.close,
                 self.end_recording,
                 self.worker.wait,
-                self._servo.stop,
+                self.servo.stop,
             ):
                 rest.callback(each)
             if self.recording is not None:
                 self.recording.collect()
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *error: object) -> None:
         self.close()

@@ -10,7 +10,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pyvista
@@ -23,7 +22,7 @@ from palpate.scenes.scene import Scene
 from palpate.show.colours import PAPER, STAGE
 from palpate.window.charts import AxesGizmo, LiveCharts
 from palpate.window.game import PRESS_M, Game
-from palpate.window.guide import GhostTip
+from palpate.window.guide import GhostTip, Guide
 from palpate.window.keys import Orbit
 from palpate.window.known import KnownSoFar
 from palpate.window.mouse_and_keys import Controls
@@ -35,9 +34,6 @@ from palpate.window.stiffness import StiffnessMap, common_limits
 from palpate.window.widgets import Board, Item
 from palpate.window.worker import Frame, Pace, RendererView, level
 from palpate.words import begun, renderer_words, sentence
-
-if TYPE_CHECKING:
-    from palpate.window.guide import Guide
 
 PERIOD_MS = 16
 SIZE = (1280, 800)
@@ -96,7 +92,7 @@ class TouchWindow:
         self._known = KnownSoFar(self.plotter)
         self._axes = AxesGizmo(self._first)
         self.plotter.subplot(0, 2)
-        self._charts = LiveCharts(self.plotter, session.trace.seconds)
+        self._charts = LiveCharts(self.plotter, session.trace.SECONDS)
         points, triangles = self.pictures[0].rest_surface
         support, radius = session.model.support, session.servo.tip_radius_m
         self.pointer = Pointer(points, triangles, radius, support.point, support.normal)

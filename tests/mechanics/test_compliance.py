@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks._condensation import condense
+from palpate.mechanics.compliance import stored_compliance
 from palpate.mechanics.compliance.sites import LoadPatch, touch_sites
-from palpate.mechanics.compliance.stored_compliance import ComplianceOptions
 from palpate.mechanics.compliance.surface_compliance import patch_blocks, surface_compliance
 from palpate.mechanics.elastic.pardiso import available
 from palpate.mechanics.elastic.solver import Solver
@@ -104,14 +104,11 @@ def test_blocks_are_symmetric_positive_and_continuous(tables):
     assert w @ moved[one] == pytest.approx(out[:, 2], rel=1e-4)
 
 
-def test_a_large_surface_is_compressed_by_itself(box):
+def test_a_large_surface_is_compressed_by_itself(box, monkeypatch):
     mesh = box((4, 4, 2), (0.05, 0.05, 0.02))
-    assert ComplianceOptions().error_of(mesh) is None
-    assert ComplianceOptions(largest_dense_bytes=1e3, low_rank_error=0.01).error_of(mesh) == 0.01
-    assert ComplianceOptions("dense", largest_dense_bytes=1e3).error_of(mesh) is None
-    assert ComplianceOptions("low-rank", low_rank_error=0.02).error_of(mesh) == 0.02
-    with pytest.raises(OptionError, match="dense, low-rank"):
-        ComplianceOptions("sparse")
+    assert stored_compliance.low_rank_error(mesh) is None
+    monkeypatch.setattr(stored_compliance, "LARGEST_DENSE_BYTES", 1e3)
+    assert stored_compliance.low_rank_error(mesh) == stored_compliance.LOW_RANK_ERROR
 
 
 def test_low_rank_tables_serve_the_same_compliance(box):

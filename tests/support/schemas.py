@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 import palpate.output
-from palpate.output import plain
+from palpate.mechanics.result import plain
 from palpate.schemas import schema
 
 

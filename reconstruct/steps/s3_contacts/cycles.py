@@ -63,12 +63,11 @@ def _ways(x: np.ndarray, step: float) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Piece:
-    """Samples [start, end) of a contact and its peak; alone: the whole of it."""
+    """Samples [start, end) of a contact and its peak."""
 
     start: int
     peak: int
     end: int
-    alone: bool
 
 
 def cycles(signals: Signals, a: int, b: int, least_n: float) -> list[Piece]:
@@ -79,7 +78,7 @@ def cycles(signals: Signals, a: int, b: int, least_n: float) -> list[Piece]:
     size = signals.magnitude[a:b]
     peaks, about = find_peaks(np.concatenate([[0.0], size, [0.0]]), prominence=least_n)
     if not len(peaks):
-        return [Piece(a, a + int(size.argmax()), b, True)]
+        return [Piece(a, a + int(size.argmax()), b)]
     peaks = np.minimum(peaks - 1, len(size) - 1)
     peaks = peaks[about["prominences"] > _FALLS * size[peaks]]
     cuts, kept = [0], list(peaks[:1])
@@ -91,10 +90,8 @@ def cycles(signals: Signals, a: int, b: int, least_n: float) -> list[Piece]:
         elif size[peak] > size[kept[-1]]:
             kept[-1] = peak
     ends = [*cuts[1:], len(size)]
-    alone = len(kept) < 2
     return [
-        Piece(a + s, a + int(p), a + e, alone)
-        for s, p, e in zip(cuts, kept or [size.argmax()], ends, strict=True)
+        Piece(a + s, a + int(p), a + e) for s, p, e in zip(cuts, kept or [size.argmax()], ends, strict=True)
     ]
 
 

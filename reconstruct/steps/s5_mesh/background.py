@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Self
+from contextlib import AbstractContextManager
 
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s5_mesh.meshing import Meshing, MeshingOptions, as_meshed, fill
 
 
-class BackgroundMesher:
+class BackgroundMesher(AbstractContextManager["BackgroundMesher"]):
     """Fills one surface and judges the mesh, each on demand and without waiting; a context manager.
 
     A mesh that is known needs no filling: `known`.
@@ -21,9 +21,6 @@ class BackgroundMesher:
         self._pool = ThreadPoolExecutor(1)
         self._mesh: Future[TetMesh] | None = None
         self._judged: Future[Meshing] | None = None
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown()

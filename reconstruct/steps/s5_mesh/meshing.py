@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.options import option
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.shape.nearest import closest, distance, sample
+from palpate.mechanics.shape.nearest import closest, distance, facings, sample
 from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces
 from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s5_mesh.registry import AUTO, MESHERS, prepared
@@ -135,9 +135,7 @@ def _stand(
     Tetrahedra that this flattens onto the support are left out, and nodes that no tetrahedron uses.
     """
     faces = _boundary(cells)
-    corner = points[faces]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    _, normal = facings(points, faces)
     height = (points - origin) @ up
     base = (np.abs(height[faces]) < reach_m).all(axis=1) & (normal @ up < -0.7)
     if not base.any():

@@ -20,6 +20,7 @@ import numpy as np
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.disk.writing import temporary_folder
 from palpate.mechanics.errors import MeshError
+from palpate.mechanics.shape.tetmesh import tet_volumes
 
 MOST_TETRAHEDRA = 150_000
 """Beyond it the factorised stiffness of quadratic elements takes more memory than a desktop has."""
@@ -115,13 +116,8 @@ def tetrahedralize(
             points, cells = found["points"], found["cells"].astype(np.int64)
     if not len(cells):
         raise MeshError(f"the mesher gave no tetrahedra: --mesh-size {edge_m} m does not fit the object")
-    corner = points[cells]
-    volume = np.einsum(
-        "ij,ij->i",
-        np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]),
-        corner[:, 3] - corner[:, 0],
-    )
-    cells[volume < 0] = cells[volume < 0][:, [0, 2, 1, 3]]
+    turned = tet_volumes(points, cells) < 0
+    cells[turned] = cells[turned][:, [0, 2, 1, 3]]
     return points, cells
 
 

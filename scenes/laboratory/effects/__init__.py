@@ -19,8 +19,6 @@ REGISTRY: dict[str, Effect] = {
 }
 """Effects by name; the order is the order in which they act."""
 
-UNNAMED = tuple(effect.name for effect in contact.UNNAMED)
-
 
 def effect(name: str) -> Effect:
     """The effect of that name; raises OptionError with the allowed names."""
@@ -29,4 +27,4 @@ def effect(name: str) -> Effect:
     return REGISTRY[name]
 
 
-__all__ = ["REGISTRY", "UNNAMED", "Bench", "Effect", "Readings", "effect"]
+__all__ = ["REGISTRY", "Bench", "Effect", "Readings", "effect"]

@@ -45,11 +45,6 @@ def _displace(readings: Readings, p: Parameters) -> Readings:
     return replace(readings, position=readings.position + share * (moved - readings.position), force=force)
 
 
-def _bend(readings: Readings, p: Parameters) -> Readings:
-    """The device reads the handle; the tip gives way under the force on it."""
-    return replace(readings, position=readings.position - readings.force / p["stiffness_n_per_m"])
-
-
 def _gain(strength: float, bench: Bench) -> dict[str, Any]:
     cross = 0.05 * strength * bench.rng.choice([-1.0, 1.0], size=(3, 3))
     matrix = np.where(np.eye(3) > 0, 1 + 0.1 * strength, cross)
@@ -91,20 +86,22 @@ def _play(values, width):
     return out
 
 
-def _gravity(strength: float, bench: Bench) -> dict[str, Any]:
-    return {"mass_kg": 0.05 * strength, "tared": True}
-
-
 EFFECTS = (
     Effect("surface_offset", "boundary", _offset_parameters, on_readings=_displace),
     Effect(
         "tool_compliance",
         "instrument",
         lambda strength, bench: {"stiffness_n_per_m": 1200.0 / strength},
-        on_readings=_bend,
+        # the device reads the handle; the tip gives way under the force on it
+        on_readings=lambda r, p: replace(r, position=r.position - r.force / p["stiffness_n_per_m"]),
         forgets=True,
     ),
-    Effect("tool_gravity_inertia", "instrument", _gravity, on_readings=_weigh),
+    Effect(
+        "tool_gravity_inertia",
+        "instrument",
+        lambda strength, bench: {"mass_kg": 0.05 * strength, "tared": True},
+        on_readings=_weigh,
+    ),
     Effect(
         "force_gain",
         "instrument",

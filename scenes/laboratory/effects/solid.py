@@ -14,10 +14,6 @@ from palpate.scenes.laboratory.surface import Surface
 from palpate.scenes.phantoms import Phantom
 
 
-def _finite(strength: float, bench: Bench) -> dict[str, Any]:
-    return {}
-
-
 def _inclusion(strength: float, bench: Bench) -> dict[str, Any]:
     """Below a touched place; moved inwards until it lies inside the object."""
     radius = bench.phantom.height_m / 5
@@ -82,10 +78,6 @@ def scaled(name: str, parameters: Parameters, modulus_pa: float) -> dict[str, An
     return {key: round(value / modulus_pa / 1e3, 9) for key, value in parameters.items()}
 
 
-def _mullins(strength: float, bench: Bench) -> dict[str, Any]:
-    return {"r": 3.7 / strength, "m_rel": 1.0}
-
-
 def _shape(strength: float, bench: Bench) -> dict[str, Any]:
     """A bite out of the place that is farthest from all touches."""
     surface = Surface(bench.phantom.vertices * 1e3, bench.phantom.faces)
@@ -106,8 +98,6 @@ def _shape(strength: float, bench: Bench) -> dict[str, Any]:
 
 
 def _bite(phantom: Phantom, p: Parameters) -> Phantom:
-    from dataclasses import replace
-
     vertices = phantom.vertices.copy()
     middle = np.array([0.0, 0.0, 0.4 * phantom.height_m])
     distance = np.linalg.norm(vertices - p["where"], axis=1)
@@ -120,7 +110,7 @@ def _bite(phantom: Phantom, p: Parameters) -> Phantom:
 
 
 EFFECTS = (
-    Effect("finite_strain", "object", _finite, lambda s, p: replace(s, finite=True)),
+    Effect("finite_strain", "object", lambda strength, bench: {}, lambda s, p: replace(s, finite=True)),
     Effect(
         "strain_stiffening",
         "object",
@@ -132,7 +122,7 @@ EFFECTS = (
     Effect(
         "mullins_softening",
         "object",
-        _mullins,
+        lambda strength, bench: {"r": 3.7 / strength, "m_rel": 1.0},
         lambda s, p: replace(s, mullins=(p["r"], p["m_rel"])),
         needs_finite=True,
     ),

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters
+from palpate.scenes.laboratory.effects.base import Bench, Effect
 from palpate.scenes.laboratory.field import Field
-from palpate.scenes.laboratory.specimen import Specimen
 
 LOG_SD = 0.35
 """Standard deviation of ln E of strength 1: nine places in ten within a factor of 1.8 of the median."""
@@ -52,8 +51,4 @@ def field_of(keys: Mapping[str, Any]) -> Field:
     return waves, layers, PASSING_MM
 
 
-def _vary(specimen: Specimen, p: Parameters) -> Specimen:
-    return replace(specimen, field=field_of(p))
-
-
-EFFECTS = (Effect("stiffness_field", "object", _drawn, _vary),)
+EFFECTS = (Effect("stiffness_field", "object", _drawn, lambda s, p: replace(s, field=field_of(p))),)

@@ -31,7 +31,7 @@ def test_quantiles_agree_with_sorting():
     for share in (0.5, 0.99, 0.999):
         exact = np.quantile(values, share) / 1000.0
         np.testing.assert_allclose(histogram.quantile_us(share), exact, rtol=0.04)
-    summary = histogram.summary()
+    summary = histogram.as_json()
     assert summary["max"] == values.max() / 1000.0
     np.testing.assert_allclose(summary["mean"], values.mean() / 1000.0)
 
