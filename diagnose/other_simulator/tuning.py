@@ -5,9 +5,9 @@ simulator starts, and how its force changes along the path is compared with the 
 setting can take off is the projection of the one on the other (forward selection by matching pursuit). So a
 setting is chosen by the course of its force over the way in and the hold, not by how much one rung of it
 helps, and a rung to the wrong side tells as much as one to the right. Those that promise most are followed,
-each by the secant of that projection, to where nothing of it is missing. Where none alone meets the force, the
-one that leaves least is kept, and the next is sought beside it. What was moved for little is set back at the
-end. A trial ends as soon as it misses by more than all that the settings which it must beat do.
+each by the secant of that projection, to where nothing of it is missing. Where none alone meets the force,
+the one that leaves least is kept, and the next is sought beside it. What was moved for little is set back.
+A trial ends as soon as it misses by more than all that the settings which it must beat do.
 """
 
 from __future__ import annotations
@@ -274,12 +274,12 @@ class Search:
         tunable, aim = promise.tunable, promise.place
         at = tunable.place(current.values[tunable.name])
         known = {at: 1.0, tunable.place(promise.trial.values[tunable.name]): _left(promise.trial, current)}
-        promised_n = promise.share * current.gap_n
+        if best is not current and promise.share * current.gap_n > best.gap_n:
+            return best
         for _ in range(STEPS):
             value = tunable.at(min(max(aim, at - JUMP, 0.0), at + JUMP, len(tunable.rungs) - 1.0))
             aim = tunable.place(value)
-            dearer = self._met(best) or (best is not current and promised_n > best.gap_n)
-            if dearer or any(abs(aim - place) < STILL for place in known):
+            if self._met(best) or any(abs(aim - place) < STILL for place in known):
                 break
             trial = self.tried({**current.values, tunable.name: value}, best)
             known[aim], best, at = _left(trial, current), self._better(trial, best), aim

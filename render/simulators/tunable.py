@@ -33,14 +33,15 @@ class Tunable:
         return next(iter(far or beyond[-1:]), None)
 
     def place(self, value: float) -> float:
-        """Where a value lies on the ladder: 0 its first rung, 1 the next; between them by ratio."""
-        above = next((k for k, rung in enumerate(self.rungs) if rung >= value), len(self.rungs) - 1)
-        if above == 0 or self.rungs[above] == value:
-            return float(above)
+        """Where a value lies on the ladder: 0 its first rung, 1 the next; between and beyond by ratio."""
+        if value in self.rungs:
+            return float(self.rungs.index(value))
+        last = len(self.rungs) - 1
+        above = next((k for k, rung in enumerate(self.rungs) if rung > value), last) or 1
         below, over = self.rungs[above - 1], self.rungs[above]
         if self.whole or not math.isfinite(over):
             return above - 0.5
-        return above - 1 + min(math.log(value / below) / math.log(over / below), 1.0)
+        return above - 1 + math.log(value / below) / math.log(over / below)
 
     def at(self, place: float) -> float:
         """The value there, 0 at least and the last rung at most; the nearest rung where there is none between

@@ -162,11 +162,31 @@ def test_a_rung_to_the_wrong_side_tells_as_much_as_one_to_the_right(springs):
     assert not wrong.whole and wrong.sums.count < 100
 
 
+def test_a_run_ends_once_it_has_missed_more_than_it_may_and_is_run_again_where_it_may_miss_more(springs):
+    runs, path = Runs("springs", RenderOptions()), press(springs, 0.002)
+    ended = runs.run({"n_per_m": 10.0}, path, most=0.01)
+    assert not ended.whole and 0.01 < ended.sums.missed and len(ended.force) < len(path.t)
+    assert ended.sums.count == len(ended.rest) == len(ended.force)
+    assert float((ended.rest**2).sum()) == pytest.approx(ended.sums.missed)
+    assert runs.run({"n_per_m": 10.0}, path, most=0.005) is ended
+    whole = runs.run({"n_per_m": 10.0}, path)
+    assert whole.whole and whole.sums.missed > ended.sums.missed and whole.sums.count == len(path.t)
+    assert runs.run({"n_per_m": 10.0}, path, most=0.01) is whole
+
+
+def test_what_lies_beyond_its_ladder_is_led_back_to_it(springs):
+    found = search(springs, target_n=1e-3)
+    found.start = {**found.start, "n_s_per_m": 40.0, "n_per_m": 300.0}
+    best = found.run()
+    assert best.values["n_s_per_m"] == pytest.approx(1.0, rel=0.2) and found.size(best)[0] == 1
+
+
 def test_a_place_on_the_ladder_is_its_value_again():
     ladder = Tunable("x", (1.0, 2.0, 8.0), "x", ())
     for value in (1.0, 1.5, 2.0, 4.0, 8.0):
         assert ladder.at(ladder.place(value)) == pytest.approx(value)
-    assert ladder.place(4.0) == pytest.approx(1.5) and ladder.place(100.0) == 2.0
+    assert ladder.place(4.0) == pytest.approx(1.5)
+    assert ladder.place(16.0) == pytest.approx(2.5) and ladder.place(0.5) == pytest.approx(-1.0)
     whole = Tunable("x", (1.0, 2.0, math.inf), "x", (), whole=True)
     assert whole.place(math.inf) == 2.0 and whole.at(1.8) == math.inf and whole.place(1.4) == 0.5
 
