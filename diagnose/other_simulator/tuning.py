@@ -229,7 +229,8 @@ class Search:
                 return best
         for promise in sorted(promises, key=lambda promise: promise.share)[:LINES]:
             best = self._line(current, promise, best)
-        if self._worth(best, current, least):
+        beside = least > NEAR and self.budget.over(current) == 1.0
+        if beside or self._worth(best, current, least):
             return best
         for tunable in order:  # none keeps what it promised: what lies to the other side
             for up in (True, False):
