@@ -48,7 +48,7 @@ CONTROLS = {
 }
 """Settings whose flaw is planted: the kit's mesh is fine under its tip already. With a step of 5 ms Drake's
 body rings and loses contact; Newton's contact diverges on this mesh at 3000 N/m, and from 30 to 1000 N/m, or
-with a damping of 30 ms, its force on the cylinder changes by 0.1 mN: nothing to tune."""
+with a damping of 30 ms, what it misses on the cylinder changes by 0.1 mN: nothing to tune."""
 ADAPTERS = {each.name: each for each in (ScikitFem, MuJoCo, Drake, Newton)}
 PLANTED: dict[str, tuple[dict[str, float], ...]] = {
     "scikit-fem": ({"penalty": 0.3}, {"penalty": 0.6}, {"penalty": 1.0}, {"penalty": 1.8}),
