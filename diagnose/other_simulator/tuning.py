@@ -232,11 +232,17 @@ class Search:
         beside = least > NEAR and self.budget.over(current) == 1.0
         if beside or self._worth(best, current, least):
             return best
-        for tunable in order:  # none keeps what it promised: what lies to the other side
-            for up in (True, False):
-                value = tunable.beside(current.values[tunable.name], up)
-                if value is not None and not self._met(best):
-                    best = self._better(self.tried({**current.values, tunable.name: value}, best), best)
+        return self._farther(current, order, best)
+
+    def _farther(self, current: Trial, order: Sequence[Tunable], best: Trial) -> Trial:
+        """The best so far, or a rung that is better, of any setting, the nearest first: a body that rings at
+        the rung beside may be at rest at the one after."""
+        places = {t.name: t.place(current.values[t.name]) for t in order}
+        rungs = [(abs(k - places[t.name]), t, rung) for t in order for k, rung in enumerate(t.rungs)]
+        for _, tunable, rung in sorted(rungs, key=lambda each: each[0]):
+            if self._met(best):
+                break
+            best = self._better(self.tried({**current.values, tunable.name: rung}, best), best)
         return best
 
     def _better(self, trial: Trial, best: Trial) -> Trial:

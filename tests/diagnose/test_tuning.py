@@ -174,6 +174,25 @@ def test_a_run_ends_once_it_has_missed_more_than_it_may_and_is_run_again_where_i
     assert runs.run({"n_per_m": 10.0}, path, most=0.01) is whole
 
 
+class Ringing(Springs):
+    """Ten times as hard from 15 to 60 N/m, where it rings."""
+
+    def step(self, dt_s, tip):
+        return super().step(dt_s, tip) * (10.0 if 15.0 < self.own.n_per_m < 60.0 else 1.0)
+
+
+def test_a_setting_is_found_behind_a_rung_at_which_it_rings(springs, monkeypatch):
+    monkeypatch.setattr(
+        "palpate.diagnosis.other_simulator.runs.create",
+        lambda name, model, options, progress, on_demand: SimulatorRenderer(name, model, Ringing, options),
+    )
+    found = search(springs, target_n=1e-3)
+    found.paths = [press(springs, 0.002, 100.0)]
+    spring = Tunable("n_per_m", (10.0, 30.0, 100.0), "k", ("contact_stiffness",), dear=True)
+    found.tunables, found.start = (spring,), {**found.start, "n_per_m": 10.0}
+    assert found.run().values["n_per_m"] == 100.0
+
+
 def test_what_lies_beyond_its_ladder_is_led_back_to_it(springs):
     found = search(springs, target_n=1e-3)
     found.start = {**found.start, "n_s_per_m": 40.0, "n_per_m": 300.0}
