@@ -25,9 +25,9 @@ from palpate.mechanics.progress import Clocked, TimeIsUp
 from palpate.render.simulators.tunable import Tunable
 
 NEAR = 1.05
-"""A gap so many times another is as good: no value is changed for less."""
+"""A gap so many times another is as good."""
 FEWER = 1.2
-"""Times the gap: what one setting more must take off, or it is not moved beside the others."""
+"""Times the gap: what every setting that is moved must take off."""
 LINES = 3
 """Of the settings that promise most, how many are followed before the next is sought beside the best."""
 HALF = 0.5
@@ -205,20 +205,19 @@ class Search:
 
     def _descend(self, current: Trial, spoken: Sequence[Tunable]) -> None:
         order = [*spoken, *(t for t in self.tunables if t not in spoken)]
-        least = NEAR
         while not self._met(current):
-            best = self._sought(current, order, len(spoken), least)
-            if not self._worth(best, current, least):
+            best = self._sought(current, order, len(spoken))
+            if not self._worth(best, current):
                 return
-            current, least = best, FEWER
+            current = best
 
-    def _sought(self, current: Trial, order: Sequence[Tunable], spoken: int, least: float) -> Trial:
-        """The best of those that differ from the current in one setting, which must leave 1 / least of its
+    def _sought(self, current: Trial, order: Sequence[Tunable], spoken: int) -> Trial:
+        """The best of those that differ from the current in one setting, which must leave 1 / FEWER of its
         gap at most. The first `spoken` of the order are followed at once where they promise that."""
         best, promises = current, []
         for k, tunable in enumerate(order):
             promise = self._promise(current, tunable)
-            if promise is None or promise.share > 1 / least:
+            if promise is None or promise.share > 1 / FEWER:
                 continue
             best = self._better(promise.trial, best)
             if k < spoken or promise.share < HALF:
@@ -229,8 +228,8 @@ class Search:
                 return best
         for promise in sorted(promises, key=lambda promise: promise.share)[:LINES]:
             best = self._line(current, promise, best)
-        beside = least > NEAR and self.budget.over(current) == 1.0
-        if beside or self._worth(best, current, least):
+        beside = self.size(current)[0] > 0 and self.budget.over(current) == 1.0
+        if beside or self._worth(best, current):
             return best
         return self._farther(current, order, best)
 
@@ -248,10 +247,10 @@ class Search:
     def _better(self, trial: Trial, best: Trial) -> Trial:
         return min(best, trial, key=self._key)
 
-    def _worth(self, trial: Trial, best: Trial, least: float) -> bool:
-        """Whether to go on there: nearer by more than nothing, or no longer too expensive."""
+    def _worth(self, trial: Trial, best: Trial) -> bool:
+        """Whether one setting more is: nearer by enough, or no longer too expensive."""
         (over, gap_n), (was, before_n) = self._key(trial), self._key(best)
-        return over < was or (over == was and least * gap_n < before_n)
+        return over < was or (over == was and FEWER * gap_n < before_n)
 
     def _met(self, trial: Trial) -> bool:
         return trial.whole and trial.gap_n <= self.target_n and self.budget.over(trial) == 1.0
