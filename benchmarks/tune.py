@@ -181,7 +181,9 @@ def _restored(row: dict[str, Any]) -> bool:
     settings, control = CONTROLS[row["simulator"]]
     own = changed(ADAPTERS[row["simulator"]].settings[settings], over("", control))
     ends = {name: row["moved"].get(name, [value, value])[1] for name, value in row["planted"].items()}
-    return all(abs(math.log(end / getattr(own, name))) <= math.log(RESTORED) for name, end in ends.items())
+    return all(
+        abs(math.log(end / getattr(own, name))) <= math.log(RESTORED) + 1e-9 for name, end in ends.items()
+    )
 
 
 def _figures(rows: list[dict[str, Any]]) -> list[Figure]:
@@ -192,6 +194,9 @@ def _figures(rows: list[dict[str, Any]]) -> list[Figure]:
         shapes = [s for row in own for s in row["shapes"] if s["name"] != TUNED_ON]
         if not shapes:
             continue
+        alone = [set(row["moved"]) == set(row["planted"]) for row in own]
+        what = f"{said}what was planted is moved, and no other, {sum(alone)} of {len(alone)}"
+        figures.append(Figure(what, 100 * float(np.mean(alone)), unit="%"))
         back = [_restored(row) for row in own]
         what = f"{said}planted setting restored within a factor of {RESTORED:g}, {sum(back)} of {len(back)}"
         figures.append(Figure(what, 100 * float(np.mean(back)), unit="%"))
