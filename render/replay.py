@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from palpate.render.exact import ExactReplay
 
 FORCES = Kind("a file of palpate replay", (b"t,fx,fy,fz",))
-_CHUNK, _TOLD = 4000, 100
+_CHUNK, _TOLD, _WATCHED = 4000, 100, 10
 
 
 def replay(
@@ -39,7 +39,7 @@ def replay(
     progress: Progress = silent,
     unsettled: Callable[[int], None] | None = None,
     checked: bool = True,
-    chunk: int = _CHUNK,
+    enough: Callable[[np.ndarray], bool] | None = None,
 ) -> np.ndarray:
     """Force on the tool (n, 3) N for a path of one tip: t (n,) s increasing, positions (n, 3) m of its
     centre.
@@ -48,7 +48,8 @@ def replay(
     model's. unsettled: told how many samples' force did not settle, and hold the one before. Bit-identical
     from run to run. Raises OptionError where the shapes disagree, and, if checked, where the path starts in
     the object: a tip that does feels nothing until it has come out.
-    chunk: samples after each of which progress is told.
+    enough: given the forces (k, 3) N so far, every few samples; where it is true the path ends, and those are
+    returned.
     """
     scene = scene_of(touched)
     t = np.ascontiguousarray(t, dtype=float)
@@ -61,10 +62,13 @@ def replay(
     forces = np.zeros_like(positions)
     state = scene.start([radius])
     steps = np.diff(t, prepend=t[0] - 1e-3) if len(t) else t
+    chunk = _CHUNK if enough is None else _WATCHED
     for first in range(0, len(t), chunk):
         part = slice(first, first + chunk)
         forces[part] = scene.follow(state, positions[part, None], steps[part])[:, 0]
         progress("replay", min(first + chunk, len(t)) / len(t))
+        if enough is not None and enough(forces[: first + chunk]):
+            return forces[: first + chunk]
     if unsettled is not None:
         unsettled(int(state.touch.unsettled[0]))
     return forces

@@ -21,8 +21,6 @@ from palpate.render.registry import create
 from palpate.render.replay import replay, rows_of_touch
 from palpate.render.simulators.base import over
 
-TOLD = 10
-"""Samples after each of which progress is told: where the time is over, a run ends there."""
 Values = Mapping[str, float]
 """Settings of a simulator by name."""
 
@@ -95,6 +93,22 @@ class Sums:
         return math.sqrt(max(rest, 0.0) / max(self.count, 1))
 
 
+@dataclass(frozen=True, eq=False)
+class Run:
+    """force (n, 3) N along the path, n as far as it was run; zeros where the simulator ends without a force.
+    rest (k, 3) N: true less simulated, of the samples that count so far."""
+
+    path: TruePath
+    sums: Sums
+    force: np.ndarray
+    rest: np.ndarray
+
+    @property
+    def whole(self) -> bool:
+        """Whether it was run to its end."""
+        return len(self.force) == len(self.path.t)
+
+
 def _cost(made: Any) -> np.ndarray:
     """(2,) s of the processor, and simulated in contact; our own renderers count none."""
     return np.array([getattr(made, "spent_s", 0.0), getattr(made, "simulated_s", 0.0)])
@@ -107,7 +121,7 @@ class Runs:
     def __init__(self, name: str, options: RenderOptions, now: Clocked = time.monotonic) -> None:
         self.name, self.options, self.now = name, options, now
         self._made: dict[tuple[Any, ...], Any] = {}
-        self._ran: dict[tuple[Any, ...], tuple[TruePath, Sums, np.ndarray]] = {}
+        self._ran: dict[tuple[Any, ...], Run] = {}
 
     def renderer(
         self, values: Values, model: Model, friction: float | None = None, progress: Progress = silent
@@ -126,36 +140,47 @@ class Runs:
     def _given(self, values: Values) -> str:
         return over(self.options.simulator_set, dict(sorted(values.items())))
 
-    def run(self, values: Values, path: TruePath, progress: Progress = silent) -> tuple[Sums, np.ndarray]:
-        """(what it missed, (n, 3) N along the path); zeros where the simulator ends without a force. Whatever
-        progress raises ends the run."""
+    def run(self, values: Values, path: TruePath, progress: Progress = silent, most: float = math.inf) -> Run:
+        """One run along a path, which ends once it has missed more than `most` N^2. Whatever progress raises
+        ends it as well."""
         progress("replay", 0.0)
         key = self._given(values), id(path)
-        if key not in self._ran:
+        known = self._ran.get(key)
+        if known is None or not (known.whole or known.sums.missed > most):
             try:
-                self._ran[key] = path, *self._run(values, path, progress)
+                self._ran[key] = self._run(values, path, progress, most)
             except BaseException:
                 self._made.clear()  # a touch that was left in its midst serves no other
                 raise
-        return self._ran[key][1:]
+        return self._ran[key]
 
-    def _run(self, values: Values, path: TruePath, progress: Progress) -> tuple[Sums, np.ndarray]:
+    def _run(self, values: Values, path: TruePath, progress: Progress, most: float) -> Run:
         begun = self.now()
         made = self.renderer(values, path.model, path.friction, progress)
         ended: tuple[str, ...] = ()
         before = _cost(made)
+
+        def compared(force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            """(simulated, true), (k, 3) N, of the samples that count so far."""
+            t = path.t[: len(force)]
+            k = len(path.at_s) if len(t) == len(path.t) else int(np.searchsorted(path.at_s, t[-1], "right"))
+            return np.column_stack([np.interp(path.at_s[:k], t, f) for f in force.T]), path.force[:k]
+
+        def enough(force: np.ndarray) -> bool:
+            at, true = compared(force)
+            return float(((at - true) ** 2).sum()) > most
+
         try:
             force = replay(
                 made, path.t, path.centre, tip_radius_m=path.model.tool.tip_radius_m, progress=progress,
-                checked=False, chunk=TOLD,
+                checked=False, enough=enough,
             )  # fmt: skip
         except OptionError as error:
             force, ended = np.zeros_like(path.centre), (f"{path.name}: {error}",)
-        at = np.column_stack([np.interp(path.at_s, path.t, f) for f in force.T])
+        at, true = compared(force)
         spent, simulated = (_cost(made) - before).tolist()
         sums = Sums(
-            float(((at - path.force) ** 2).sum()), float((at * path.force).sum()), float((at**2).sum()),
-            float((path.force**2).sum()), len(at), spent, simulated, ended,
-            self.now() - begun,
+            float(((at - true) ** 2).sum()), float((at * true).sum()), float((at**2).sum()),
+            float((true**2).sum()), len(at), spent, simulated, ended, self.now() - begun,
         )  # fmt: skip
-        return sums, force
+        return Run(path, sums, force, true - at)

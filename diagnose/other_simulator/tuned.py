@@ -119,7 +119,7 @@ class Judged:
 
 def off(runs: Runs, values: Values, paths: Sequence[TruePath], progress: Progress = silent) -> Sums:
     """What settings miss of some paths, together."""
-    return sum((runs.run(values, path, progress)[0] for path in paths), Sums())
+    return sum((runs.run(values, path, progress).sums for path in paths), Sums())
 
 
 def start_of(adapter: Adapter) -> dict[str, float]:

@@ -44,7 +44,7 @@ TUNABLES = (
     Tunable("contact_n_per_m", (30.0, 100.0, 300.0, 1e3, 3e3, 1e4), "soft_contact_ke, and ke of the sphere",
             ("contact_stiffness", "tunnelling")),
     Tunable("sweeps", (5, 10, 20, 40, 80), "iterations of SolverVBD", ("mesh_stiffness", "time_step"),
-            whole=True),
+            whole=True, dear=True),
     EDGES,
     density("density of add_soft_mesh"),
     Tunable("timestep_s", (5e-4, 1e-3, 1 / 600, 4e-3, 8e-3), "the step",

@@ -41,7 +41,8 @@ SETTINGS = {DOCUMENTED: ScikitFemSettings(10.0), BEST: ScikitFemSettings(30.0, 2
 TUNABLES = (
     Tunable("penalty", (0.3, 1.0, 3.0, 10.0, 30.0, 100.0), "spring of the contact, over the stiffness of the "
             "object under one node", ("contact_stiffness",)),
-    Tunable("order", (1, 2), "ElementTetP1 or ElementTetP2", ("mesh_stiffness", "contact_nodes"), whole=True),
+    Tunable("order", (1, 2), "ElementTetP1 or ElementTetP2", ("mesh_stiffness", "contact_nodes"),
+            whole=True, dear=True),
     EDGES,
 )  # fmt: skip
 NEAR_RADII = 1.05

@@ -15,6 +15,7 @@ class Tunable:
 
     rungs: values to try, increasing, whose ends are its bounds; whole: none between them. term: as that
     simulator's own files and calls name it. mends: numerical effects (`diagnose.numerics`), strongest first.
+    dear: whether larger values cost more.
     """
 
     name: str
@@ -22,6 +23,7 @@ class Tunable:
     term: str
     mends: tuple[str, ...]
     whole: bool = False
+    dear: bool = False
 
     def beside(self, value: float, up: bool) -> float | None:
         """The next rung up or down that tells something, or the last one; None at the end."""
@@ -30,11 +32,25 @@ class Tunable:
         far = [r for r in beyond if self.whole or max(r / value, value / r) > APART]
         return next(iter(far or beyond[-1:]), None)
 
-    def between(self, one: float, two: float) -> float | None:
-        """The middle of two values by ratio; None where there is none."""
-        if self.whole or not (math.isfinite(one) and math.isfinite(two)) or one == two:
-            return None
-        return math.sqrt(one * two)
+    def place(self, value: float) -> float:
+        """Where a value lies on the ladder: 0 its first rung, 1 the next; between and beyond by ratio."""
+        if value in self.rungs:
+            return float(self.rungs.index(value))
+        last = len(self.rungs) - 1
+        above = next((k for k, rung in enumerate(self.rungs) if rung > value), last) or 1
+        below, over = self.rungs[above - 1], self.rungs[above]
+        if self.whole or not math.isfinite(over):
+            return above - 0.5
+        return above - 1 + math.log(value / below) / math.log(over / below)
+
+    def at(self, place: float) -> float:
+        """The value there, 0 at least and the last rung at most; the nearest rung where there is none between
+        them."""
+        if self.whole:
+            return self.rungs[round(place)]
+        below = min(math.floor(place), len(self.rungs) - 2)
+        one, two = self.rungs[below : below + 2]
+        return one if place == below else one * (two / one) ** (place - below)
 
     def size(self, start: float, value: float) -> float:
         """How large a change is: the logarithm of the ratio; infinity lies twice the ladder beyond it."""

@@ -253,9 +253,9 @@ def _named(
     start = start_of(adapter)
     for k, (number, path) in enumerate(paths.items()):
         progress(f"{runs.name} as it is, press {k + 1} of {len(paths)}", 0.5 * k / len(paths))
-        sums, found = runs.run(start, path, progress)
-        if not sums.ended:
-            force[rows_of_touch(measured.t, presses, number)] = found
+        found = runs.run(start, path, progress)
+        if not found.sums.ended:
+            force[rows_of_touch(measured.t, presses, number)] = found.force
             chosen[number] = True
     plain = ForcesOptions(clock_offset_s=0.0, simulated_axes=AS_RECORDED, simulated_unit="N")
     asked = Asked(
