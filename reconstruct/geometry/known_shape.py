@@ -62,7 +62,8 @@ def place(
     progress("registration", 0.0)
     given = read_surface(options.shape, options.unit, direction(options.up))
     stood = standing(given, options.up, options.sink_m)
-    traces = options.pose == "auto" and set(presses.kinds) == {"press"}
+    # cycles are contact that never breaks: of most presses a robot's, of some the tracing itself
+    traces = options.pose == "auto" and 2 * presses.kinds.count("press") > len(presses)
     support = _traced_support(first) if traces else None
     body = ShapeToPlace(stood.vertices, stood.triangles, stood.support_point, stood.support_normal)
     touched = _touched(presses, support)
