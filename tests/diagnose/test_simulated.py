@@ -506,6 +506,16 @@ def test_a_file_that_ends_early_is_judged_by_the_presses_that_it_covers(world):
     assert offset == pytest.approx(-late, abs=0.05)
 
 
+def test_forces_between_the_presses_deny_no_clock(world):
+    """A simulation pushes hard where the foot was traced, as its object stands there: another offset was
+    asked for."""
+    recording, model, _, force, _ = world
+    presses, t = model.presses, recording.t
+    given = Forces(np.append(t, t + t[-1] + 1.0), np.vstack([force, 10 * force]), "x")
+    found = aligned(given, presses, ForcesOptions())
+    assert found.usable.all() and not found.notes
+
+
 def test_the_answer_says_how_bad_against_the_force_and_where(world):
     """A third more force is a third of it; what is not named has no size."""
     told = str(judged(world, 1.5 * world[3]))
