@@ -12,7 +12,7 @@ from palpate.mechanics.effects.base import Scope
 from palpate.mechanics.effects.registry import effect
 from palpate.show.diagnosis.gaps import depth_contrast, in_model, press_gaps, worst_press
 from palpate.show.diagnosis.parameters import short
-from palpate.words import begun, between_words, force_words, listed, mm, percent, place_mm, spaced, spoken
+from palpate.words import begun, estimate_words, force_words, listed, mm, percent, place_mm, spaced, spoken
 
 AXIS_WORDS = {
     "depth": "how deep the press is",
@@ -204,15 +204,15 @@ def _how_far(result: Diagnosis) -> tuple[str, str, str]:
     before, noise = force_words(result.gap_before_n), force_words(result.noise_n)
     typical = "Root mean square at held-out places"
     if result.effects and result.gap_closed is not None and result.gap_closed_ci95 is not None:
-        low, high = result.gap_closed_ci95
+        share, between = estimate_words(result.gap_closed, *result.gap_closed_ci95)
         after = force_words(result.gap_after_n)
         if result.gap_after_n >= 0.98 * result.gap_before_n:
             return question, f"{before}, and not less", (
                 f"{typical}. What was found does not lower it there. The sensor's own noise is {noise}."
             )  # fmt: skip
         text = (
-            f"{typical}. The sensor's own noise is {noise}: {percent(result.gap_closed)} of the gap above "
-            f"it is explained (95 % sure: {between_words(low, high)})."
+            f"{typical}. The sensor's own noise is {noise}: {share} of the gap above it is "
+            f"explained (95 % sure: {between})."
         )
         return question, f"From {before} to {after}", text
     text = f"{typical}: {before}. The sensor's own noise is {noise}."

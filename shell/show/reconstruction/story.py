@@ -123,7 +123,7 @@ def _made(result: Reconstruction) -> say.Story:
     used = len(result.model.presses)
     yield say.TextLine(f"contacts: {used + len(not_used)} found, {used} used")
     if not_used:
-        causes = ", ".join(f"{n} {reason}" for reason, n in gathered(reason for _, reason in not_used))
+        causes = ", ".join(f"{reason} ({n})" for reason, n in gathered(reason for _, reason in not_used))
         yield say.TextLine(
             f"{counted(len(not_used), 'contact')} not used: {causes} (--json names each with its time)"
         )
