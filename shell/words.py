@@ -171,7 +171,7 @@ def sure_kpa(ci95_pa: Sequence[float], form: str = ".2f") -> str:
 
 def place_mm(point_m: Iterable[float]) -> str:
     """A place, m, as '(12, -3, 80) mm'."""
-    return f"({', '.join(f'{1e3 * v:.0f}' for v in point_m)}) mm"
+    return f"({', '.join(f'{1e3 * v:z.0f}' for v in point_m)}) mm"
 
 
 def force_words(newtons: float) -> str:

@@ -15,7 +15,7 @@ from palpate.operations.press import _compared
 from palpate.operations.touch import _Opening
 from palpate.reconstruction.checks.finding import Finding
 from palpate.render.press import Curve
-from palpate.words import estimate_words, gathered
+from palpate.words import estimate_words, gathered, place_mm
 
 
 def test_a_finding_says_its_cure_once():
@@ -84,3 +84,7 @@ def test_a_touch_says_what_was_made_of_an_open_surface(block):
         run = _Opening.touched(opening, session, SimpleNamespace(title="mug", name="mug"))
         told[model is mended] = "\n".join(run.lines())
     assert "winding number" in told[True] and "cm³" in told[True] and "cm³" not in told[False]
+
+
+def test_no_coordinate_is_minus_nothing():
+    assert place_mm((0.01, -0.024, -1e-9)) == "(10, -24, 0) mm"
