@@ -248,8 +248,8 @@ def test_a_page_presses_first_as_deep_as_the_game_asks_and_less_into_what_is_thi
 
 
 @needs_browser
-def test_the_slider_stands_at_the_first_depth(asked, renderer):
-    assert state(asked, "wanted") == pytest.approx(first_depth(renderer.model))
+def test_the_slider_stands_at_the_first_depth(tab, renderer):
+    assert state(tab, "wanted") == pytest.approx(first_depth(renderer.model))
 
 
 @needs_browser
