@@ -62,6 +62,9 @@ def verdict(result: Diagnosis) -> str:
         return "Measured and simulated force differ, and nothing that this program knows explains it" + (
             f"; {rivals} is suspected." if rivals else "."
         )
+    if not left_out and "unknown" in result.kind:
+        known = f"what it knows is {there}, which the model already has"
+        return f"The simulation leaves out something that this program does not know: {known}."
     if not left_out:
         said = f"Nothing new is missing: what these touches show is {there}, which the model already has"
     elif result.kind == "ambiguous" and rivals and not _likelier_than_not(result):
@@ -142,7 +145,7 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
         "All other sets of effects that were tried, and that nothing is missing, are less likely than one "
         "in ten together. How evidence counts was learnt from simulated recordings whose truth is known."
     )
-    if len(sure) == 1:
+    if len(sure) == 1 and "unknown" not in result.kind:
         return question, f"{percent(sum(sure.values()))} sure", text
     each = ", ".join(f"{spaced(name)} {percent(share)}" for name, share in sure.items())
     return question, begun(each), text
