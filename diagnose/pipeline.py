@@ -18,7 +18,7 @@ from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions, Nuisa
 from palpate.diagnosis.search.attribution import attribute
 from palpate.diagnosis.search.descent import misfit_of
 from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.site_stiffness import site_stiffness_sd
+from palpate.diagnosis.search.site_stiffness import site_stiffness_sd, stands_open
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.diagnosis.verdict.conclusion import conclude
 from palpate.diagnosis.verdict.result import Diagnosis
@@ -95,7 +95,10 @@ def measure(
     if options.exact:
         forward = solved(forward, part(progress, 0.05, 0.1))
         clock.lap("solved places")
-    excluded = frozenset({*options.left_out, *readings.unobservable})
+    unseen = set(readings.unobservable)
+    if stands_open(model):
+        unseen |= {e.name for e in effects() if e.hints.by_base}
+    excluded = frozenset({*options.left_out, *unseen})
     offsets = taken_off(readings, forward, excluded, rules)
     settled = {*offsets.names, *ruled_out(forward, readings.rigid, readings.move, rules)}
     left_out = {e.name for e in effects() if e.hints.expensive and options.fast}
@@ -107,7 +110,7 @@ def measure(
         offsets,
         excluded,
         tried=tuple(e for e in able if e.name not in (left_out | settled | hidden)),
-        untried=tuple(sorted(left_out | readings.unobservable | (hidden - settled))),
+        untried=tuple(sorted(left_out | unseen | (hidden - settled))),
     )
 
 
@@ -136,6 +139,8 @@ def search(
     found = attribute(weighed, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     clock.lap("effects")
     why += readings.not_weighed
+    if words := stands_open(forward.model):
+        why.append(words)
     for name in sorted(seen - set(found.chosen)):
         why.append(f"{name.replace('_', ' ')}: the presses do not confirm it, so it is not named")
     offsets = dataclasses.replace(corrected.offsets, reasons=tuple(why))

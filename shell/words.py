@@ -171,7 +171,7 @@ def sure_kpa(ci95_pa: Sequence[float], form: str = ".2f") -> str:
 
 def place_mm(point_m: Iterable[float]) -> str:
     """A place, m, as '(12, -3, 80) mm'."""
-    return f"({', '.join(f'{1e3 * v:.0f}' for v in point_m)}) mm"
+    return f"({', '.join(f'{1e3 * v:z.0f}' for v in point_m)}) mm"
 
 
 def force_words(newtons: float) -> str:
@@ -184,10 +184,10 @@ def percent(share: float, form: str = ".0f") -> str:
     return f"{100 * share:{form}}\u00a0%"
 
 
-def between_words(low: float, high: float) -> str:
-    """An interval of shares: '85 to 91 %', with a decimal where its ends would be one number."""
-    digits = 0 if round(100 * low) != round(100 * high) else 1
-    return f"{100 * low:.{digits}f} to {100 * high:.{digits}f}\u00a0%"
+def estimate_words(share: float, low: float, high: float) -> tuple[str, str]:
+    """A share and its interval: '88 %', '85 to 91 %', with a decimal where the ends would be one number."""
+    form = ".0f" if round(100 * low) != round(100 * high) else ".1f"
+    return percent(share, form), f"{100 * low:{form}} to {percent(high, form)}"
 
 
 def chance_words(p: float) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.effects.base import Effect, Keys
 from palpate.mechanics.presses.table import Presses
 
 LEAST_SHARE = 0.1
@@ -44,7 +44,9 @@ class SampleEvidence:
 
 @dataclass(frozen=True, kw_only=True)
 class NumericalEffect(Effect):
-    """A flaw of a simulator. advice: what mends it, in words that fit any simulator.
+    """A flaw of a simulator. advice: what mends it, in words that fit any simulator. how_much(keys): by what
+    factor, in words that go on from them. opposite(keys): the whole advice where it errs the other way, else
+    ''.
 
     see(signal): of what shows in the samples themselves and needs no law; it is taken off before any law is
     fitted. None: it is searched for, as physical effects are.
@@ -52,7 +54,15 @@ class NumericalEffect(Effect):
 
     domain: str = "numerics"
     advice: str = ""
+    how_much: Callable[[Keys], str] | None = None
+    opposite: Callable[[Keys], str] | None = None
     see: Callable[[Signal], SampleEvidence] | None = None
+
+    def advised(self, keys: Keys, own_words: str = "") -> str:
+        """What mends a flaw of this size; own_words: of the simulator, in place of `advice`."""
+        other = self.opposite(keys) if self.opposite else ""
+        much = f"; {self.how_much(keys)}" if self.how_much else ""
+        return other or (own_words or self.advice) + much
 
 
 def signal_of(presses: Presses, force: np.ndarray) -> Signal:

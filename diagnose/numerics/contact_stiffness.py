@@ -14,9 +14,10 @@ from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.numerics.base import NumericalEffect
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.disk.schema import FileKey
-from palpate.mechanics.effects.base import Parameter, Scope
+from palpate.mechanics.effects.base import Keys, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
+from palpate.mechanics.quantities import quantity_words
 
 
 def layer_factors(share: float) -> tuple[np.ndarray, np.ndarray]:
@@ -41,6 +42,12 @@ def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[
     return {"stiffness_n_per_m": float(1 / max(values[0] + layer, 1e-9))}
 
 
+def _how_much(keys: Keys) -> str:
+    now = keys["stiffness_n_per_m"]
+    ten = quantity_words("stiffness_n_per_m", 10 * now)
+    return f"{ten} in place of {quantity_words('stiffness_n_per_m', now)} leave a tenth of its error"
+
+
 EFFECT = NumericalEffect(
     name="contact_stiffness",
     scope=Scope.EVERYWHERE,
@@ -55,5 +62,6 @@ EFFECT = NumericalEffect(
     change=_change,
     advice="raise the contact stiffness (a penalty of ten times the object's own stiffness under the tip "
     "leaves a tenth), or lower the time constant of the contact",
+    how_much=_how_much,
     hints=SearchHints(hides_strain=True, stands_for_strain=True),
 )

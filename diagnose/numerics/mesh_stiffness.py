@@ -48,6 +48,19 @@ def _words(keys: Keys) -> str:
     return f"{number_words(keys['ratio'])} times as stiff as it should be{places}"
 
 
+def _how_much(keys: Keys) -> str:
+    return f"enough when the force is {number_words(1 / keys['ratio'])} times what it is"
+
+
+def _too_soft(keys: Keys) -> str:
+    if keys["ratio"] >= 1:
+        return ""
+    return (
+        "it is too soft: check that the modulus is the one stated, and the force's unit; "
+        f"{number_words(1 / keys['ratio'])} times the modulus makes up for it"
+    )
+
+
 EFFECT = NumericalEffect(
     name="mesh_stiffness",
     scope=Scope.EVERYWHERE,
@@ -61,8 +74,9 @@ EFFECT = NumericalEffect(
     report=_report,
     keys_in_words=_words,
     change=_change,
-    advice="check that the modulus is the one stated, and the force's unit; if it is too stiff, refine the "
-    "mesh, use quadratic elements, or lower Poisson's ratio by steps (0.49, 0.47, 0.45) until the force no "
-    "longer changes",
+    advice="check that the modulus is the one stated, and the force's unit; refine the mesh, use quadratic "
+    "elements, or lower Poisson's ratio by steps (0.49, 0.47, 0.45)",
+    how_much=_how_much,
+    opposite=_too_soft,
     hints=SearchHints(),
 )

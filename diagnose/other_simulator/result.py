@@ -44,7 +44,7 @@ def advice_of(
     has. unstated: a stiffness may be a modulus that nobody stated."""
     said = []
     for name in (*numerics.named, *numerics.candidates):
-        words = own_words.get(name) or numerical(name).advice
+        words = numerical(name).advised(numerics.keys[name], own_words.get(name, ""))
         which = "" if name in numerics.named else "or "
         said.append(f"{which}{name.replace('_', ' ')}: {words}")
     if unstated:

@@ -10,7 +10,9 @@ from palpate.diagnosis.options import NuisanceOptions
 from palpate.diagnosis.search.fit import Fit
 from palpate.mechanics.contact.edges import nearness
 from palpate.mechanics.law_errors import Repeats
+from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
+from palpate.reconstruction.geometry.known_shape import OPEN
 from palpate.render.force_error import SURE, law_share
 
 
@@ -32,6 +34,17 @@ def surface_error(forward: Forward) -> np.ndarray:
     near = tree.query_ball_point(touches.point, 0.35 * height)
     of = model.shape_uncertainty_m[surface]
     return np.array([np.sqrt(np.mean(of[i] ** 2)) if len(i) else 0.0 for i in near]) / height
+
+
+def stands_open(model: Model) -> str:
+    """That a registered shape may stand so otherwise that its base tells nothing, in words; '' where not."""
+    open_m = float(model.about.get("geometry", {}).get("surface_sd_p95_m", 0.0))
+    if open_m <= OPEN * float(np.linalg.norm(np.ptp(model.mesh.points, axis=0))):
+        return ""
+    return (
+        f"how the shape stands is open by {1e3 * open_m:.0f} mm, which looks like a base that gives or is "
+        "loose: trace the table or touch its other faces, to tell"
+    )
 
 
 def bound_sd(forward: Forward) -> np.ndarray:

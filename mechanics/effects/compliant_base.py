@@ -55,6 +55,7 @@ EFFECT = Effect(
     apply=unchanged,
     hold=_hold,
     hints=SearchHints(
+        by_base=True,
         hides_strain=True,
         expensive=True,
     ),

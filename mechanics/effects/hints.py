@@ -30,6 +30,7 @@ class SearchHints:
     few_places: it lives in few places, so the one that speaks loudest counts, and the shape may be its rival.
     any_form: it can take the form of others that differ from place to place, so it is no rival of one of them
     that gains more. slips: it caps the sideways force, where a fit that trusts the stick may go wrong.
+    by_base: it acts through the base, as does not knowing how the object stands.
     by_first_touches: it shows by them alone, and not where another effect moved them or the surface was
     fitted to them.
     hides_strain: it bends force against depth the other way than finite strain, so neither shows alone.
@@ -51,6 +52,7 @@ class SearchHints:
     few_places: bool = False
     any_form: bool = False
     slips: bool = False
+    by_base: bool = False
     by_first_touches: bool = False
     hides_strain: bool = False
     stands_for_strain: bool = False

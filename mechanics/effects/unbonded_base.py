@@ -51,6 +51,7 @@ EFFECT = Effect(
     hold=_hold,
     hints=SearchHints(
         candidates=_starts,
+        by_base=True,
         expensive=True,
     ),
 )

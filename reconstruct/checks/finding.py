@@ -77,7 +77,8 @@ class Finding:
 
     def line(self) -> str:
         """One line for a person."""
-        return f"{'GRAVE' if self.grave else 'note'}: {self.name}: {self.saw} ({self.sure}); {self.todo}"
+        found = f"{'GRAVE' if self.grave else 'note'}: {self.name}: {self.saw} ({self.sure})"
+        return found if self.todo in self.saw else f"{found}; {self.todo}"
 
     def as_json(self) -> dict[str, Any]:
         """Its figures, keys with units."""

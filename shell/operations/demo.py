@@ -7,7 +7,6 @@ window opens at the end.
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -64,8 +63,6 @@ def demo(
 
 
 def _has_screen() -> bool:
-    if not sys.stdout.isatty():
-        return False
-    if sys.platform == "linux":
-        return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-    return True
+    from palpate.show.scenery import no_screen
+
+    return sys.stdout.isatty() and not no_screen()

@@ -150,7 +150,8 @@ def _explorer(
 
 
 def _in_window(begun: Begun, output: str, scene: str, given: Mapping[str, Any], call: Call) -> Explored:
-    from palpate.operations.touch import NO_SCREEN, VIRTUAL_SCREEN, no_screen, touch
+    from palpate.operations.touch import VIRTUAL_SCREEN, touch
+    from palpate.show.scenery import no_screen
     from palpate.window.guide import Guide
 
     kept: list[Explorer] = []
@@ -162,9 +163,9 @@ def _in_window(begun: Begun, output: str, scene: str, given: Mapping[str, Any], 
         return Guide(kept[-1], servo, session.model, session.worker, output)
 
     said = {name: value for name, value in given.items() if value is not None}
-    if no_screen():
+    if why := no_screen():
         raise DeviceError(
-            f"{NO_SCREEN}: watch a simulated robot explore (`palpate explore --phantom dome -o REC`), or use "
+            f"{why}: watch a simulated robot explore (`palpate explore --phantom dome -o REC`), or use "
             f"{VIRTUAL_SCREEN}"
         )
     touched = touch(scene, guide=guided, **said)

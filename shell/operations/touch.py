@@ -8,7 +8,6 @@ presses, the wheel sets the depth, the right button turns the view; buttons do t
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -330,14 +329,7 @@ def _gallery() -> list[Scene]:
     return [load_scene(name) for name in (DEFAULT, *there)]
 
 
-NO_SCREEN = "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set)"
 VIRTUAL_SCREEN = "'xvfb-run -s \"-screen 0 1280x800x24\" palpate ...'"
-
-
-def no_screen() -> bool:
-    """Whether a window would have nowhere to open."""
-    there = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    return sys.platform.startswith("linux") and not there
 
 
 def _check(
@@ -348,6 +340,8 @@ def _check(
     replay: str | None,
     headless: bool,
 ) -> None:
+    from palpate.show.scenery import no_screen
+
     for value, allowed, what in (
         (name, tuple(DEVICES), "device"),
         (renderer, names(), "renderer"),
@@ -362,9 +356,9 @@ def _check(
     if headless:
         if name == "mouse":
             raise DeviceError("the mouse needs the window: drop --headless, or use --device simulated")
-    elif no_screen():
+    elif why := no_screen():
         raise DeviceError(
-            f"{NO_SCREEN}: press it in a browser (`palpate export SCENE --to page -o touch.html`), use "
+            f"{why}: press it in a browser (`palpate export SCENE --to page -o touch.html`), use "
             f"`palpate touch --headless`, or {VIRTUAL_SCREEN}"
         )
 

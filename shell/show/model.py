@@ -97,7 +97,8 @@ def story(result: Model) -> say.Story:
     """The model's size, and the object to be turned."""
     mesh, nu = result.mesh, result.material.poisson_ratio
     height = float(result.support.height(mesh.points).max())
-    yield say.Headline(f"Model of {result.name}: {modulus_words(result)}, Poisson's ratio {nu:g}")
+    what = "Model" if result.name == "model" else f"Model of {result.name}"
+    yield say.Headline(f"{what}: {modulus_words(result)}, Poisson's ratio {nu:g}")
     if parts := parts_words(result):
         yield say.Note(parts)
     if mended := mended_words(result):
@@ -123,7 +124,7 @@ def story(result: Model) -> say.Story:
         f"mesh: {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra of order {mesh.order}, "
         f"edges of {mm(result.mesh_size_m, '.4g')}"
     )
-    yield say.Detail(f"folder: {result.path or 'not written; .save(MODEL) writes it'}")
+    yield say.Detail(f"folder: {result.path or 'not written; -o MODEL, in Python .save(MODEL), writes it'}")
 
 
 KEYS: tuple[say.Key, ...] = (

@@ -8,6 +8,7 @@ which a bare machine may lack.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from dataclasses import dataclass
@@ -144,17 +145,37 @@ _LINE_POINTS = 20_000
 _BAR = {"n_labels": 2, "fmt": "%.3g", "color": "black", "title_font_size": 18, "label_font_size": 15}
 
 
+def no_screen() -> str:
+    """Why a window would have nowhere to open; '' where it has. Drawing where no X server answers ends the
+    program without a word."""
+    if not sys.platform.startswith("linux") or os.environ.get("WAYLAND_DISPLAY"):
+        return ""
+    display = os.environ.get("DISPLAY")
+    if not display:
+        return "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set)"
+    try:
+        x11 = ctypes.CDLL("libX11.so.6")
+    except OSError:
+        return ""  # nobody to ask
+    x11.XOpenDisplay.restype = ctypes.c_void_p
+    answers = x11.XOpenDisplay(None)
+    if not answers:
+        return f"there is no screen (none answers at DISPLAY={display})"
+    x11.XCloseDisplay(ctypes.c_void_p(answers))
+    return ""
+
+
 def new_plotter(*, off_screen: bool) -> pyvista.Plotter:
     """A plotter of our own; raises OptionError where it would open a window and there is no screen."""
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=off_screen or None, window_size=[1000, 750])
-    screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
-    if sys.platform.startswith("linux") and not (screen or plotter.off_screen or plotter.notebook):
+    why = "" if plotter.off_screen or plotter.notebook else no_screen()
+    if why:
         plotter.close()
         raise OptionError(
-            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): write a picture with "
-            "show(screenshot='NAME.png'), or hand in a plotter that is off screen"
+            f"{why}: write a picture with show(screenshot='NAME.png'), or hand in a plotter that is off "
+            "screen"
         )
     plotter.background_color = pyvista.Color("white")
     return plotter

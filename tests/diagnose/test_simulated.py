@@ -11,7 +11,7 @@ import pytest
 from palpate.diagnosis.numerics.base import Signal, signal_of
 from palpate.diagnosis.numerics.contact_stiffness import layer_factors
 from palpate.diagnosis.numerics.lost_contact import lost
-from palpate.diagnosis.numerics.registry import NAMES, numericals
+from palpate.diagnosis.numerics.registry import NAMES, numerical, numericals
 from palpate.diagnosis.options import DiagnoseOptions
 from palpate.diagnosis.other_simulator.against_law import seen_in_samples
 from palpate.diagnosis.other_simulator.declared_parameters import StatedForward, stated_of
@@ -237,6 +237,20 @@ def test_numerical_effects_have_names_of_their_own_and_do_nothing_at_their_ideal
         effect.act(settings, effect.ideal, forward)
         assert forward.predict(settings) == pytest.approx(plain, abs=1e-12), effect.name
         assert effect.advice
+
+
+@pytest.mark.parametrize(
+    ("factor", "said", "unsaid"), [(1.5, "0.67 times", "soft"), (0.7, "1.43 times", "refine")]
+)
+def test_the_advice_says_how_much_and_which_way(world, factor, said, unsaid):
+    """Forces of 0.7 times the measured ones were told to refine the mesh, if it was too stiff."""
+    (advice,) = (words for words in judged(world, factor * world[3]).advice if words.startswith("mesh stiff"))
+    assert said in advice and unsaid not in advice
+
+
+def test_a_contact_that_gives_is_told_how_hard_it_is_and_should_be():
+    advice = numerical("contact_stiffness").advised({"stiffness_n_per_m": 280.0})
+    assert "2.8 N/mm in place of 0.28 N/mm leave a tenth" in advice
 
 
 def test_a_layer_of_springs_takes_its_share_of_the_depth_and_most_of_a_light_press():
@@ -504,6 +518,16 @@ def test_a_file_that_ends_early_is_judged_by_the_presses_that_it_covers(world):
         aligned(Forces(t + late, force, "x"), presses, plain)
     offset = float(re.search(r"--clock-offset (-?[\d.]+)", str(refused.value))[1])
     assert offset == pytest.approx(-late, abs=0.05)
+
+
+def test_forces_between_the_presses_deny_no_clock(world):
+    """A simulation pushes hard where the foot was traced, as its object stands there: another offset was
+    asked for."""
+    recording, model, _, force, _ = world
+    presses, t = model.presses, recording.t
+    given = Forces(np.append(t, t + t[-1] + 1.0), np.vstack([force, 10 * force]), "x")
+    found = aligned(given, presses, ForcesOptions())
+    assert found.usable.all() and not found.notes
 
 
 def test_the_answer_says_how_bad_against_the_force_and_where(world):

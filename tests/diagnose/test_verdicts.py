@@ -26,7 +26,7 @@ from palpate.show.demo import diagnosis_json, diagnosis_words
 from palpate.show.diagnosis.gaps import press_gaps
 from palpate.show.diagnosis.parameters import parameter_rows, short
 from palpate.show.diagnosis.story import next_steps
-from palpate.show.diagnosis.words import short_verdict, verdict, where
+from palpate.show.diagnosis.words import how_sure, short_verdict, verdict, where
 from palpate.words import force_words, spoken
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
@@ -343,6 +343,18 @@ def test_what_the_model_already_has_is_not_proposed_again(delayed, tmp_path, no_
     assert ["put finite strain into the model" in page for page in pages] == [True, False, False]
     assert ["--corrected" in page for page in pages] == [True, True, False]
     assert [r.as_json()["verdict"]["effects"] for r in (linear, neo)] == [list(both.effects)] * 2
+
+
+def test_what_is_missing_and_unknown_is_not_called_nothing(delayed):
+    """'Nothing new is missing ... Something else is missing', beside '90 % sure'."""
+    model, found = delayed[1:]
+    neo = model.with_material(dent_law="neo-hookean")
+    entry = dataclasses.replace(found.entries[0], name="finite_strain")
+    open_ = dataclasses.replace(
+        found, effects=("finite_strain",), entries=(entry,), candidates=(), kind="effect+unknown", model=neo
+    )
+    assert "Nothing" not in verdict(open_) and "does not know" in verdict(open_)
+    assert how_sure(open_)[1].startswith("Finite strain")
 
 
 def test_what_no_model_holds_is_not_to_be_put_into_one(delayed):

@@ -13,8 +13,21 @@ from palpate.diagnosis.explore.suggestion import Suggestion
 from palpate.operations.explore import _line
 from palpate.operations.press import _compared
 from palpate.operations.touch import _Opening
+from palpate.reconstruction.checks.finding import Finding
 from palpate.render.press import Curve
-from palpate.words import gathered
+from palpate.words import estimate_words, gathered, place_mm
+
+
+def test_a_finding_says_its_cure_once():
+    saw = "nothing was traced: say what is known of the object: --shape FILE"
+    told = Finding("no base", saw, "it stops there", "say what is known of the object", np.inf, np.inf).line()
+    assert told.count("what is known") == 1 and told.endswith("(it stops there)")
+
+
+def test_a_share_has_the_digits_of_its_interval():
+    """'100 % (99.5 to 99.8 %)' lay outside its own interval."""
+    assert estimate_words(0.997, 0.995, 0.998) == ("99.7\u00a0%", "99.5 to 99.8\u00a0%")
+    assert estimate_words(0.88, 0.85, 0.91) == ("88\u00a0%", "85 to 91\u00a0%")
 
 
 def test_reasons_that_differ_in_figures_are_one():
@@ -71,3 +84,7 @@ def test_a_touch_says_what_was_made_of_an_open_surface(block):
         run = _Opening.touched(opening, session, SimpleNamespace(title="mug", name="mug"))
         told[model is mended] = "\n".join(run.lines())
     assert "winding number" in told[True] and "cm³" in told[True] and "cm³" not in told[False]
+
+
+def test_no_coordinate_is_minus_nothing():
+    assert place_mm((0.01, -0.024, -1e-9)) == "(10, -24, 0) mm"

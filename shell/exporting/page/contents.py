@@ -13,6 +13,7 @@ from palpate.devices.codecs import spacemouse
 from palpate.exporting.page.tables import (
     PackedArrays,
     depths_of,
+    first_depth,
     greatest_depth,
     modes_of,
     responses,
@@ -113,6 +114,7 @@ def about(renderer: FemRenderer, depths_m: np.ndarray) -> dict[str, Any]:
         "support_point": model.support.point.tolist(),
         "support_normal": model.support.normal.tolist(),
         "depths_m": depths_m.tolist(),
+        "first_depth_m": first_depth(model),
         "spacemouse": {
             "full_scale": spacemouse.FULL_SCALE,
             "products": [[vendor, each] for vendor, all_ in spacemouse.PRODUCTS.items() for each in all_],

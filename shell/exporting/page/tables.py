@@ -22,6 +22,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.frames import local_frames
+from palpate.mechanics.model.model import Model
 from palpate.render.base import Renderer
 
 MOST_MODES = 40
@@ -133,6 +134,13 @@ def greatest_depth(renderer: Renderer) -> float:
     touched = float(np.nanmax(model.presses.depth_m)) if len(model.presses) else 0.0
     height = float(model.support.height(model.mesh.points).max())
     return float(min(max(1.1 * touched, 2.0 * model.tool.tip_radius_m), 0.6 * height))
+
+
+def first_depth(model: Model) -> float:
+    """How deep a page presses at first, m: 4 mm under a tip of 5 mm radius, less into an object so thin that
+    its support is felt."""
+    height = float(model.support.height(model.mesh.points).max())
+    return min(0.8 * model.tool.tip_radius_m, 0.15 * height)
 
 
 def depths_of(deepest_m: float) -> np.ndarray:

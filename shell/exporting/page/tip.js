@@ -18,7 +18,7 @@ class SeenTip {
     this.touch = new Touch(this.surface, this.tables, about.tip_radius_m, about.friction);
     this.mouse = new SpaceMouse(about.spacemouse);
     Object.assign(this, { place: null, goal: 0, depth: 0, held: false, greeting: null, pointers: new Map(), trail: [], peak: null, dirty: true, spent: [], asked: [] });
-    this.wanted = Math.min(0.6 * this.tables.most, about.tip_radius_m);
+    this.wanted = about.first_depth_m;
     this.camera = new Camera(this.surface.vertices, about.support_normal, about.support_point, about.view);
     this.chart = new Chart($("chart"), this.colours());
     this.controls();

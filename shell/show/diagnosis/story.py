@@ -38,9 +38,9 @@ from palpate.show.diagnosis.words import (
 )
 from palpate.show.page import feel_step, file_words
 from palpate.words import (
-    between_words,
     chance_words,
     ended,
+    estimate_words,
     force_words,
     kpa,
     percent,
@@ -98,10 +98,9 @@ def _how_far(result: Diagnosis) -> say.Story:
     noise = f"; the sensor's noise is {force_words(result.noise_n)}"
     if result.gap_closed is not None and result.gap_closed_ci95 is not None and result.effects:
         yield say.TextLine(f"{off}, {force_words(result.gap_after_n)} with what was found{noise}")
-        interval = f"95 % sure: {between_words(*result.gap_closed_ci95)}"
+        share, between = estimate_words(result.gap_closed, *result.gap_closed_ci95)
         yield say.Detail(
-            f"{percent(result.gap_closed)} of the gap above the noise is explained ({interval}), at held-out "
-            "places",
+            f"{share} of the gap above the noise is explained (95 % sure: {between}), at held-out places",
             on=say.TEXT,
         )
     else:

@@ -12,7 +12,7 @@ from palpate.mechanics.effects.base import Scope
 from palpate.mechanics.effects.registry import effect
 from palpate.show.diagnosis.gaps import depth_contrast, in_model, press_gaps, worst_press
 from palpate.show.diagnosis.parameters import short
-from palpate.words import begun, between_words, force_words, listed, mm, percent, place_mm, spaced, spoken
+from palpate.words import begun, estimate_words, force_words, listed, mm, percent, place_mm, spaced, spoken
 
 AXIS_WORDS = {
     "depth": "how deep the press is",
@@ -62,6 +62,9 @@ def verdict(result: Diagnosis) -> str:
         return "Measured and simulated force differ, and nothing that this program knows explains it" + (
             f"; {rivals} is suspected." if rivals else "."
         )
+    if not left_out and "unknown" in result.kind:
+        known = f"what it knows is {there}, which the model already has"
+        return f"The simulation leaves out something that this program does not know: {known}."
     if not left_out:
         said = f"Nothing new is missing: what these touches show is {there}, which the model already has"
     elif result.kind == "ambiguous" and rivals and not _likelier_than_not(result):
@@ -142,7 +145,7 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
         "All other sets of effects that were tried, and that nothing is missing, are less likely than one "
         "in ten together. How evidence counts was learnt from simulated recordings whose truth is known."
     )
-    if len(sure) == 1:
+    if len(sure) == 1 and "unknown" not in result.kind:
         return question, f"{percent(sum(sure.values()))} sure", text
     each = ", ".join(f"{spaced(name)} {percent(share)}" for name, share in sure.items())
     return question, begun(each), text
@@ -204,15 +207,15 @@ def _how_far(result: Diagnosis) -> tuple[str, str, str]:
     before, noise = force_words(result.gap_before_n), force_words(result.noise_n)
     typical = "Root mean square at held-out places"
     if result.effects and result.gap_closed is not None and result.gap_closed_ci95 is not None:
-        low, high = result.gap_closed_ci95
+        share, between = estimate_words(result.gap_closed, *result.gap_closed_ci95)
         after = force_words(result.gap_after_n)
         if result.gap_after_n >= 0.98 * result.gap_before_n:
             return question, f"{before}, and not less", (
                 f"{typical}. What was found does not lower it there. The sensor's own noise is {noise}."
             )  # fmt: skip
         text = (
-            f"{typical}. The sensor's own noise is {noise}: {percent(result.gap_closed)} of the gap above "
-            f"it is explained (95 % sure: {between_words(low, high)})."
+            f"{typical}. The sensor's own noise is {noise}: {share} of the gap above it is "
+            f"explained (95 % sure: {between})."
         )
         return question, f"From {before} to {after}", text
     text = f"{typical}: {before}. The sensor's own noise is {noise}."

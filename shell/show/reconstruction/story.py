@@ -10,6 +10,7 @@ import numpy as np
 
 from palpate.mechanics.contact.touch import forces_at
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.presses.table import Presses
 from palpate.operations._written import open_words
 from palpate.reconstruction.checks.finding import OF_A_KNOWN_OBJECT, Way
 from palpate.reconstruction.pipeline import Reconstruction
@@ -122,7 +123,7 @@ def _made(result: Reconstruction) -> say.Story:
     used = len(result.model.presses)
     yield say.TextLine(f"contacts: {used + len(not_used)} found, {used} used")
     if not_used:
-        causes = ", ".join(f"{n} {reason}" for reason, n in gathered(reason for _, reason in not_used))
+        causes = ", ".join(f"{reason} ({n})" for reason, n in gathered(reason for _, reason in not_used))
         yield say.TextLine(
             f"{counted(len(not_used), 'contact')} not used: {causes} (--json names each with its time)"
         )
@@ -227,18 +228,11 @@ def _differs(result: Reconstruction) -> say.Story:
 def view(result: Reconstruction) -> View:
     """The object; each press as measured and as the model with its one modulus answers the same path."""
     model = result.model
-    shown = low_passed(model.presses).window(0.03, 0.03)
+    shown = _shown(model)
     colourings, lines = usual_colourings(model), [Line("measured", local(shown, shown.force), "measured")]
     selected = 0
-    if result.sites is not None and result.modulus is not None:
-        force = forces_at(
-            result.sites,
-            shown.displacement,
-            shown.starts,
-            young_modulus_pa=result.modulus.modulus_pa,
-            tip_radius_m=shown.tip_radius_m,
-            law=result.modulus.press.law,
-        )
+    force = _with_one_modulus(result, shown)
+    if force is not None:
         lines.append(Line("model with one modulus", local(shown, force)))
         each = rms_by_press(shown, force - shown.force)
         words = (
@@ -248,6 +242,24 @@ def view(result: Reconstruction) -> View:
         colourings.insert(1, Colouring(ERROR, None, each, words))
         selected = int(np.argmax(each))
     return view_of_presses(model, shown, colourings, lines, selected)
+
+
+def _shown(model: Model) -> Presses:
+    return low_passed(model.presses).window(0.03, 0.03)
+
+
+def _with_one_modulus(result: Reconstruction, shown: Presses) -> np.ndarray | None:
+    """(n, 3) N at the rows of presses: the model's force with its one modulus; None where it has none."""
+    if result.sites is None or result.modulus is None:
+        return None
+    return forces_at(
+        result.sites,
+        shown.displacement,
+        shown.starts,
+        young_modulus_pa=result.modulus.modulus_pa,
+        tip_radius_m=shown.tip_radius_m,
+        law=result.modulus.press.law,
+    )
 
 
 def object_figure(model: Model) -> Figure:
@@ -306,8 +318,10 @@ def meaning(result: Reconstruction) -> str:
             f" Another exploration of the same object would be expected to find a modulus within "
             f"{100 * max(high / e - 1, 1 - low / e):.0f} % of this one."
         )
-    if result.modulus:
-        misfit = float(np.sqrt((result.modulus.press.rms_n**2).mean()))
+    shown = _shown(model)
+    force = _with_one_modulus(result, shown)
+    if force is not None:
+        misfit = float(np.sqrt((rms_by_press(shown, force - shown.force) ** 2).mean()))
         words += f" With one modulus for the whole object, a press's force is off by {mn(misfit)} (rms)."
     return words
 

@@ -4,6 +4,7 @@ pen, keys and links move its tip."""
 from __future__ import annotations
 
 import copy
+import dataclasses
 import json
 import shutil
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ import palpate as pp
 from palpate.devices.codecs import spacemouse
 from palpate.exporting.page.contents import force_band, shown_modes
 from palpate.exporting.page.document import button, page_of
-from palpate.exporting.page.tables import modes_of
+from palpate.exporting.page.tables import first_depth, modes_of
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
@@ -236,6 +237,19 @@ def test_the_mouse_presses_slides_and_lets_go(tab):
     tab.mouse("mouseReleased", x + 60, y, button="left", clickCount=1)
     tab.wait("!palpate.page.touch.touching")
     assert "greatest of the last press" in tab.evaluate("document.getElementById('parts').textContent")
+
+
+def test_a_page_presses_first_as_deep_as_the_game_asks_and_less_into_what_is_thin(block):
+    """It began at 5 mm, where the game says 4, and a quarter into an object of 20 mm."""
+    assert first_depth(block) == pytest.approx(min(FIND_M, 0.15 * np.ptp(block.mesh.points[:, 2])))
+    flat = block.mesh.points * [1.0, 1.0, 0.2]
+    thin = block.replaced(mesh=dataclasses.replace(block.mesh, points=flat))
+    assert first_depth(thin) == pytest.approx(0.15 * np.ptp(flat[:, 2])) and first_depth(thin) < FIND_M
+
+
+@needs_browser
+def test_the_slider_stands_at_the_first_depth(tab, renderer):
+    assert state(tab, "wanted") == pytest.approx(first_depth(renderer.model))
 
 
 @needs_browser

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +15,10 @@ from palpate.render.replay import replay_error
 from palpate.show.comparison.figures import draw
 from palpate.show.demo import view
 from palpate.show.page import new_figure
+from palpate.show.reconstruction.story import meaning
+from palpate.show.reconstruction.story import view as view_of_made
+
+from ...reconstruct.flat_ground import raster
 
 
 def test_the_demos_presses_and_its_headline_are_of_one_kind():
@@ -28,6 +34,20 @@ def test_the_demos_presses_and_its_headline_are_of_one_kind():
     samples = np.diff(model.presses.window(0.05, 0.05).starts)
     mean = np.sqrt((samples * error.presses**2).sum() / samples.sum())
     assert mean == pytest.approx(whole.rmse_n, rel=0.01)
+
+
+@pytest.mark.slow
+def test_what_one_modulus_leaves_is_the_presses_error_on_the_page():
+    """9 mN were told, those of presses each with a modulus of its own, beside a press of 296 mN."""
+    recording = raster()
+    half = 1 + (recording.position[:, :1] > recording.position[:, 0].mean())
+    twice = dataclasses.replace(recording, force_on_tool=recording.force_on_tool * half)
+    made = pp.reconstruct(twice, half_space=True, progress=False)
+    (error,) = (c for c in view_of_made(made).colourings if "force error" in c.title)
+    said = float(re.search(r"off by ([\d.]+) mN", meaning(made))[1])
+    assert said == pytest.approx(1e3 * np.sqrt((error.presses**2).mean()), rel=0.02)
+    felt = np.linalg.norm(twice.force_on_tool, axis=1).max()
+    assert said > 50 * felt
 
 
 def test_every_press_of_a_chart_has_its_number_the_worst_first():

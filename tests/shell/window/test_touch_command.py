@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from ctypes.util import find_library
 from dataclasses import replace
 from pathlib import Path
 
@@ -91,6 +92,19 @@ def test_no_screen_is_said(
         monkeypatch.delenv(name, raising=False)
     assert main(["touch", str(block.path)]) == 2
     assert "--headless" in capsys.readouterr().err
+
+
+def test_a_screen_that_does_not_answer_is_said(
+    block: Model, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Of a DISPLAY that was left over the program died in the drawing library, with exit code 139."""
+    if not sys.platform.startswith("linux") or not find_library("X11"):
+        pytest.skip("only of an X server can be asked whether it is there")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", ":9999")
+    assert main(["touch", str(block.path)]) == 2
+    error = capsys.readouterr().err
+    assert "DISPLAY=:9999" in error and "--headless" in error
 
 
 def test_tracing_counts_the_way_around(block: Model) -> None:
