@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import argparse
+
 import pytest
 
-from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, tried
+from benchmarks import mesh_zoo
+from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, run, tried
 
 TEN = (
     "prostate",
@@ -26,6 +29,18 @@ def test_a_mesh_of_the_zoo_is_pressed_right(name, tmp_path):
     found = tried(ZOO[name](), tmp_path, sizes=1, places=1, solved=0)
     assert found["outcome"] in OUTCOMES[:2], found
     assert found["pressed"] == 1 and found["least_force_n"] > 0
+
+
+def test_a_stopped_run_goes_on_where_it_was(tmp_path, monkeypatch):
+    arguments = argparse.Namespace(
+        only="two blocks touching", first=60, sizes=1, places=0, solved=0, work=str(tmp_path / "kept.jsonl")
+    )
+    first = run(arguments)
+    monkeypatch.setattr(mesh_zoo, "tried", lambda *_: pytest.fail("it was meshed again"))
+    assert run(arguments)["shapes"] == first["shapes"]
+    arguments.places = 1  # another setting is another run
+    with pytest.raises(pytest.fail.Exception):
+        run(arguments)
 
 
 def test_there_are_sixty():
