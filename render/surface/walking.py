@@ -11,7 +11,7 @@ import numpy as np
 from palpate.mechanics.kernels import inner, kernel, shared_part
 
 FOOT_STEPS = 24
-FOOT_LEAST = 0.5
+FOOT_LEAST = 0.5  # of what is left, what a walk of that length takes away at least: it grows no faster
 WALK_EDGES = 64
 
 
