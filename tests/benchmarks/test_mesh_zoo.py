@@ -6,7 +6,9 @@ import argparse
 
 import pytest
 
+import palpate as pp
 from benchmarks import mesh_zoo
+from benchmarks._zoo_presses import places_of
 from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, run, tried
 
 TEN = (
@@ -29,6 +31,14 @@ def test_a_mesh_of_the_zoo_is_pressed_right(name, tmp_path):
     found = tried(ZOO[name](), tmp_path, sizes=1, places=1, solved=0)
     assert found["outcome"] in OUTCOMES[:2], found
     assert found["pressed"] == 1 and found["least_force_n"] > 0
+
+
+def test_what_lies_under_a_place_is_the_object_and_not_the_triangle_that_it_is_in(tmp_path):
+    """Most places of smooth shapes were pressed by 0.1 mm, as if the object were as thin."""
+    drawn = ZOO["tongue"]()
+    drawn.mesh.export(tmp_path / "tongue.stl")
+    places = places_of(pp.model_of(tmp_path / "tongue.stl", unit=drawn.unit, up=drawn.up), 8)
+    assert (places.thickness > 0.005).all()
 
 
 def test_a_stopped_run_goes_on_where_it_was(tmp_path, monkeypatch):
