@@ -10,6 +10,7 @@ solver of a press.
 from __future__ import annotations
 
 import argparse
+import json
 import re
 import tempfile
 import time
@@ -26,7 +27,7 @@ from benchmarks._zoo_damage import BROKEN, SCANS
 from benchmarks._zoo_parts import PARTS, PHANTOMS
 from benchmarks._zoo_presses import compare
 from benchmarks._zoo_shapes import ORGANS, Drawn
-from benchmarks.evidence import Figure, rates
+from benchmarks.evidence import Figure, commit_of, rates
 from palpate.mechanics.errors import PalpateError
 from palpate.mechanics.model.model import Model
 
@@ -55,19 +56,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sizes", type=int, choices=(1, 2), default=2, help="of the mesh (default: 2)")
     parser.add_argument("--places", type=int, default=8, help="pressed on each; 0: none (default: 8)")
     parser.add_argument("--solved", type=int, default=1, help="of them solved too (default: 1)")
+    parser.add_argument("--work", metavar="FILE", help="keep each shape's line there: a stopped run goes on")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """{"shapes": {name: what became of it}, "figures"}; a line is printed for each shape."""
     chosen = [name for name in ZOO if arguments.only in name][: arguments.first]
+    setting = (arguments.sizes, arguments.places, arguments.solved)
     shapes: dict[str, dict[str, Any]] = {}
     with tempfile.TemporaryDirectory() as folder:
+        kept = Path(arguments.work or Path(folder) / "kept.jsonl")
+        of = [commit_of(Path(__file__).parents[1]), *setting]
+        done = _done(kept, of)
         for name in chosen:
-            shapes[name] = one = tried(
-                ZOO[name](), Path(folder), arguments.sizes, arguments.places, arguments.solved
-            )
-            print(_line(name, one), flush=True)
+            if name not in done:
+                one = tried(ZOO[name](), Path(folder), *setting)
+                with kept.open("a", encoding="utf-8") as lines:
+                    lines.write(json.dumps({"name": name, "of": of, "found": one}, default=float) + "\n")
+                done[name] = one
+            shapes[name] = done[name]
+            print(_line(name, shapes[name]), flush=True)
     return {"shapes": shapes, "figures": _figures(shapes)}
+
+
+def _done(kept: Path, of: list[Any]) -> dict[str, dict[str, Any]]:
+    """What a run of the same commit and setting found before it was stopped."""
+    if not kept.is_file():
+        return {}
+    lines = [json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines()]
+    return {line["name"]: line["found"] for line in lines if line["of"] == of}
 
 
 def tried(drawn: Drawn, folder: Path, sizes: int = 2, places: int = 8, solved: int = 1) -> dict[str, Any]:

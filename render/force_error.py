@@ -116,15 +116,25 @@ def place_numbers(
     renderer: FemRenderer, tip_radius_m: float, vertices: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
     """(4, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
-    radius; how far a push along the normal moves the surface sideways, as compliance times the tip's radius
-    and the modulus; how near a rim and how near the base it is (mechanics.contact.edges.nearness)."""
+    radius; how far a push along the normal moves the surface sideways (`way_aside`); how near a rim and how
+    near the base it is (mechanics.contact.edges.nearness)."""
     surface, mesh, parameters = renderer.contact.arrays, renderer.model.mesh, renderer.parameters
     points, normals, far = surface.vertices[vertices], surface.normals[vertices], renderer.far_at(vertices)
     along = np.einsum("vab,vb->va", far, normals)
-    sideways = np.linalg.norm(along - np.einsum("va,va->v", along, normals)[:, None] * normals, axis=1)
+    give = np.einsum("va,va->v", along, normals)
+    sideways = np.linalg.norm(along - give[:, None] * normals, axis=1)
     bent = np.abs(parameters.curvature[vertices])
     rim, base = nearness(mesh, points, normals)
-    return np.stack([bent * tip_radius_m, sideways * tip_radius_m, rim, base])
+    return np.stack([bent * tip_radius_m, way_aside(give, sideways, tip_radius_m), rim, base])
+
+
+def way_aside(give: np.ndarray, sideways: np.ndarray, tip_radius_m: float | np.ndarray) -> np.ndarray:
+    """(k,) how far a push moves the surface sideways beside what gives way to it: about the dent on a compact
+    object, the object itself where it bends, which is solved as such.
+
+    give, sideways: (k,) 1/m, compliance along the normal and across it, unit modulus.
+    """
+    return sideways * tip_radius_m / np.maximum(give * tip_radius_m, 1.0)
 
 
 def rendered_share(renderer: FemRenderer, depth: np.ndarray, numbers: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Models that come with the program, so that a first touch waits for nothing.
 
 FOLDER/NAME.zip holds the MODEL folder of a scene. NAME is that of the scene's folder in the cache, which
-ends with a hash of all that the model depends on (scenes.build): a scene that was changed finds nothing here
+ends with a hash of all that the model depends on (scenes.kept): a scene that was changed finds nothing here
 and is made as ever. `python -m tools.shipped_models` makes the files; tests say when they must be made anew.
 
 The compliance is packed: of its symmetric blocks one half, rounded to 11 bits, which moves a force by less

@@ -20,6 +20,7 @@ from palpate.mechanics.compliance.near_field import surface_softness
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
 from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import SceneError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.options import option
@@ -37,10 +38,22 @@ LEAST_FLATNESS = 0.9
 """Cosine between a place's normal and those of its triangles: rims are not pressed."""
 
 
+def solver_of(model: Model) -> Solver:
+    """The solver of touches on the model, balls and all."""
+    balls = tuple(model.material.inclusions.values())
+    return touch_solver(model.mesh, model.material.poisson_ratio, model.ratio_without_balls, balls=balls)
+
+
 def palpate_model(
-    model: Model, progress: Progress = silent, *, sites: int = SITES, depth_m: float = DEPTH_M
+    model: Model,
+    progress: Progress = silent,
+    *,
+    sites: int = SITES,
+    depth_m: float = DEPTH_M,
+    solver: Solver | None = None,
 ) -> Model:
-    """The model with a table of presses: one to `depth_m` at each of `sites` places."""
+    """The model with a table of presses: one to `depth_m` at each of `sites` places. solver: `solver_of` it,
+    where the caller has it."""
     from palpate.reconstruction.steps.s6_one_d import (  # here: a touch spreads places alone
         columns,
         fit_robust,
@@ -50,14 +63,14 @@ def palpate_model(
     points, normals = model.mesh.points[chosen], model.normals[chosen]
     if model.mesh.shape is not None:
         points, normals = model.mesh.shape.foot(points, normals)
-    nu, balls = model.material.poisson_ratio, tuple(model.material.inclusions.values())
+    nu = model.material.poisson_ratio
     touched = touch_sites(
         model.mesh,
         points,
         normals,
         nu,
-        solver=touch_solver(model.mesh, nu, model.ratio_without_balls, balls=balls),
-        patch=LoadPatch(tip_radius_m=model.tool.tip_radius_m, balls=bool(balls)),
+        solver=solver or solver_of(model),
+        patch=LoadPatch(tip_radius_m=model.tool.tip_radius_m, balls=bool(model.material.inclusions)),
         progress=progress,
     )
     # over the modulus of what the tip meets, of which the dent is, as the renderer has it

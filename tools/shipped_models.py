@@ -21,7 +21,8 @@ from palpate.mechanics.model.files import write_model
 from palpate.mechanics.model.model import Model
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.surface.felt_surface import with_own_stiffness
-from palpate.scenes.build import folder_name, model_of
+from palpate.scenes.build import model_of
+from palpate.scenes.kept import folder_name
 from palpate.scenes.scene import FOLDER as SCENES
 from palpate.scenes.scene import read_scene
 from palpate.scenes.shipped import FOLDER, pack

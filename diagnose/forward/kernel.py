@@ -44,8 +44,7 @@ def integrate(start, y, far, radius, bend, e_dent, e_far, nu, table, tool_compli
         anchor1 = y[start[p], 1]
         anchor2 = y[start[p], 2]
         for i in range(start[p], start[p + 1]):
-            if y[i, 0] <= 0.0:
-                touch_remember(state, 0.0, 0.0, 0.0, 0.0, radius[p])
+            if y[i, 0] <= 0.0 and state[1] == 0.0:
                 anchor1 = y[i, 1]
                 anchor2 = y[i, 2]
                 out[i, 0] = out[i, 1] = out[i, 2] = 0.0
@@ -59,7 +58,8 @@ def integrate(start, y, far, radius, bend, e_dent, e_far, nu, table, tool_compli
                 fn, fu, fv, dent, a, du, dv, _k = touch_solve(
                     state, d, compliance, table, radius[p], bend[p], plane_strain, stick
                 )
-                state[1] = dent  # where the next solution starts from
+                if dent > 0.0:
+                    state[1] = dent  # where the next solution starts from
                 pull = np.sqrt(fu * fu + fv * fv)
                 excess, kept = slip_excess(pull, fn, mu)
                 if excess == 0.0 or slip == SLIPS - 1:
@@ -72,6 +72,9 @@ def integrate(start, y, far, radius, bend, e_dent, e_far, nu, table, tool_compli
                 anchor1 += length * fu / pull
                 anchor2 += length * fv / pull
             touch_remember(state, dent, a, du, dv, radius[p])
+            if dent == 0.0:
+                anchor1 = y[i, 1]
+                anchor2 = y[i, 2]
             out[i, 0] = fn
             out[i, 1] = fu
             out[i, 2] = fv

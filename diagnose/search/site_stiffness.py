@@ -13,7 +13,7 @@ from palpate.mechanics.law_errors import Repeats
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.reconstruction.geometry.known_shape import OPEN
-from palpate.render.force_error import SURE, law_share
+from palpate.render.force_error import SURE, law_share, way_aside
 
 
 def site_stiffness_sd(forward: Forward, options: NuisanceOptions) -> np.ndarray:
@@ -51,7 +51,7 @@ def bound_sd(forward: Forward) -> np.ndarray:
     """(p,) one standard deviation of the bound that the law carries at each press, of a shallow dent, as a
     share of the force (render.force_error.law_share)."""
     t, places, model = forward.touches, forward.places, forward.model
-    sideways = np.linalg.norm(places.far[:, 1:, 0], axis=1) * t.tip_radius_m
+    sideways = way_aside(places.far[:, 0, 0], np.linalg.norm(places.far[:, 1:, 0], axis=1), t.tip_radius_m)
     bent = np.abs(places.curvature) * t.tip_radius_m
     rim, base = nearness(model.mesh, t.point, t.normal)
     ratio = model.material.poisson_ratio

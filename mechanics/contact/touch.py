@@ -117,13 +117,14 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
     what it needs.
     """
     press = -d[0]
-    if not press > 0.0:
+    # what is held may bend towards the tip, whose plane it then meets later
+    if not (press > 0.0 or state[1] > 0.0):
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     cnn, cuu, cuv, cvv = far[0, 0], far[1, 1], far[1, 2], far[2, 2]
     # no dent is deeper than what a stiffening support (1 / (1 - STIFFEST)) makes of the whole displacement:
     # a tip that is dragged far while it sticks must not run away
-    low, high = 0.0, (press + np.sqrt(d[1] * d[1] + d[2] * d[2])) / (1.0 - STIFFEST)
-    dent = state[1] if 0.0 < state[1] < high else 0.5 * press
+    low, high = 0.0, (abs(press) + np.sqrt(d[1] * d[1] + d[2] * d[2])) / (1.0 - STIFFEST)
+    dent = state[1] if 0.0 < state[1] < high else 0.5 * abs(press)
     tolerance = 1e-10 * radius
     # a compliance that is positive definite as it is needs no limit
     minor = cuu * cvv - cuv * cuv
@@ -160,6 +161,8 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
         step = -excess / slope
         if abs(step) < tolerance:
             break
+        if not (press > 0.0 or high > tolerance):
+            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         dent += step
         if not (low < dent < high):
             dent = 0.5 * (low + high)

@@ -95,7 +95,8 @@ def felt_here(p, state, tips, i):
     fn, fu, fv, dent, a, du, dv, tangent = touch_solve(
         memory, local, state.local_far[i], p.table, state.radius[i], state.bend[i], plane_strain, stick
     )
-    memory[1] = dent  # where the next solution starts from
+    if dent > 0.0:
+        memory[1] = dent  # where the next solution starts from
     trial[0], trial[1], trial[2], trial[3] = fn, fu, fv, dent
     trial[4], trial[5], trial[6], trial[7], trial[8] = a, du, dv, tangent, stick * a
 

@@ -44,7 +44,7 @@ def forget(state, i):
 def conclude(p, state, tips, i):
     """Write tip i's memories and its force; let go of it where nothing presses and nothing pulls."""
     grip, out, normal = state.grip, state.solution[i], state.normals[i]
-    pressed = out[0] > 0.0
+    pressed = out[0] > 0.0 or state.held[i] == 1
     if pressed:
         if state.held[i] == 0:
             touch_remember(state.memory[i], out[3], out[4], out[5], out[6], state.radius[i])
@@ -98,6 +98,36 @@ def _felt(p, state, i, load):
     return most
 
 
+@part
+def _has_left(p, state, tips, i):
+    """Whether tip i has strayed from its anchor, both of the object at rest and as the last tick moved it
+    there: a slender body bends after a tip that it holds."""
+    frame, far, force, beside = state.frames[i], state.local_far[i], state.elastic[i], state.vectors[1]
+    for k in range(3):
+        beside[k] = tips[i, k]
+    for _ in range(2):
+        if not strayed(
+            p.surface,
+            beside,
+            state.points[i],
+            state.normals[i],
+            state.radii_m[i],
+            state.vectors[0],
+            state.stack,
+        ):
+            return False
+        for k in range(3):
+            beside[k] += state.carried[k, i]
+        for r in range(3):
+            away = 0.0
+            for c in range(3):
+                for k in range(3):
+                    away += far[r, c] * frame[c, k] * force[k]
+            for k in range(3):
+                beside[k] += away * frame[r, k]
+    return True
+
+
 SWEEPS = 60
 
 
@@ -112,15 +142,7 @@ def fem_step(p, state, tips):
         if not (np.isfinite(tips[i, 0]) and np.isfinite(tips[i, 1]) and np.isfinite(tips[i, 2])):
             lose(grip, i)
         else:
-            if grip.triangle[i] >= 0 and strayed(
-                p.surface,
-                tips[i],
-                state.points[i],
-                state.normals[i],
-                state.radii_m[i],
-                state.vectors[0],
-                state.stack,
-            ):
+            if grip.triangle[i] >= 0 and _has_left(p, state, tips, i):
                 forget(state, i)
                 release(grip, i, tips[i])
             # a tip that has strayed from its anchor may still overlap the object elsewhere: no tick without

@@ -10,7 +10,8 @@ import numpy as np
 
 from palpate.mechanics.kernels import inner, kernel, shared_part
 
-FOOT_STEPS = 12
+FOOT_STEPS = 24
+FOOT_LEAST = 0.5  # of what is left, what a walk of that length takes away at least: it grows no faster
 WALK_EDGES = 64
 
 
@@ -163,20 +164,26 @@ def foot(surface, triangle, weights, tip, point, normal, move):
 
     Writes weights, point, normal; returns (triangle, height): height = n . (tip - point), m.
     """
-    height = 0.0
+    height, share, before = 0.0, 1.0, 0.0
+    last_x = last_y = last_z = 0.0
     for step in range(FOOT_STEPS):
         place(surface, triangle, weights, point, normal)
         height = 0.0
         for k in range(3):
             height += normal[k] * (tip[k] - point[k])
-        squared = 0.0
-        for k in range(3):
-            move[k] = tip[k] - point[k] - height * normal[k]
-            squared += move[k] * move[k]
+        x, y, z = (
+            tip[0] - point[0] - height * normal[0],
+            tip[1] - point[1] - height * normal[1],
+            tip[2] - point[2] - height * normal[2],
+        )
+        squared = x * x + y * y + z * z
         if squared < 1e-20 or step == FOOT_STEPS - 1:
             break
-        if step > 3:  # on tight convexities full steps overshoot: damp them
-            for k in range(3):
-                move[k] *= 0.5
+        if step > 0:
+            # over a tight convexity a walk takes away several times its own length of what is left
+            taken = before - (x * last_x + y * last_y + z * last_z)
+            share = min(share * before / max(taken, FOOT_LEAST * before), 1.0)
+        before, last_x, last_y, last_z = squared, x, y, z
+        move[0], move[1], move[2] = share * x, share * y, share * z
         triangle = walk(surface, triangle, weights, move)
     return triangle, height

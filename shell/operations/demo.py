@@ -40,8 +40,8 @@ def demo(
 ) -> DemoResult:
     """Do all of it, and write the report."""
     from palpate.operations._run import run_command
-    from palpate.scenes.build import keep
     from palpate.scenes.embedded import embedded_recording
+    from palpate.scenes.kept import keep
     from palpate.scenes.scene import FOLDER, read_scene
 
     into = Path(folder)

@@ -15,8 +15,8 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
 from palpate.mechanics.errors import PalpateError
 from palpate.mechanics.progress import Progress
 from palpate.mechanics.recording.recording import read_recording
-from palpate.scenes.build import kept_surface
 from palpate.scenes.embedded import embedded_recording
+from palpate.scenes.kept import kept_surface
 from palpate.scenes.phantoms import phantom
 from palpate.scenes.scene import Scene
 from palpate.show.colours import COLOURS, GREY, HINT, PAPER, STAGE

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
+
 import pytest
 
-from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, tried
+import palpate as pp
+from benchmarks import mesh_zoo
+from benchmarks._zoo_presses import places_of
+from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, run, tried
 
 TEN = (
     "prostate",
@@ -26,6 +31,26 @@ def test_a_mesh_of_the_zoo_is_pressed_right(name, tmp_path):
     found = tried(ZOO[name](), tmp_path, sizes=1, places=1, solved=0)
     assert found["outcome"] in OUTCOMES[:2], found
     assert found["pressed"] == 1 and found["least_force_n"] > 0
+
+
+def test_what_lies_under_a_place_is_the_object_and_not_the_triangle_that_it_is_in(tmp_path):
+    """Most places of smooth shapes were pressed by 0.1 mm, as if the object were as thin."""
+    drawn = ZOO["tongue"]()
+    drawn.mesh.export(tmp_path / "tongue.stl")
+    places = places_of(pp.model_of(tmp_path / "tongue.stl", unit=drawn.unit, up=drawn.up), 8)
+    assert (places.thickness > 0.005).all()
+
+
+def test_a_stopped_run_goes_on_where_it_was(tmp_path, monkeypatch):
+    arguments = argparse.Namespace(
+        only="two blocks touching", first=60, sizes=1, places=0, solved=0, work=str(tmp_path / "kept.jsonl")
+    )
+    first = run(arguments)
+    monkeypatch.setattr(mesh_zoo, "tried", lambda *_: pytest.fail("it was meshed again"))
+    assert run(arguments)["shapes"] == first["shapes"]
+    arguments.places = 1  # another setting is another run
+    with pytest.raises(pytest.fail.Exception):
+        run(arguments)
 
 
 def test_there_are_sixty():

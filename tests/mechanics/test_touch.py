@@ -167,3 +167,17 @@ def test_a_body_that_gives_along_itself_as_it_bends_has_one_force_whatever_was_t
             ]
             forces.append(frame.T @ [fn, fu, fv])
     assert np.ptp(forces, axis=0) == pytest.approx(0.0, abs=1e-6 * np.abs(forces).max())
+
+
+def test_a_body_that_bends_towards_a_tip_that_sticks_holds_it_beyond_its_own_plane():
+    # of a tentacle, pushed along its axis: its end has turned and stays in touch as the tip is drawn up
+    far = np.array([[36.2, 0.0, -56.0], [0.0, 123.4, 0.0], [-56.0, 0.0, 87.5]])
+    table, (plane_strain, stick) = dent_law("linear", 0.49).table, moduli(5e3, 0.49)
+    d = path([0, 0, 0], [-1e-3, 0, 0], [-1e-3, 0, -3e-3], [3e-3, 0, -3e-3], steps=2000)
+    state = np.zeros(STATE_SIZE)
+    force = np.array([touch_step(state, x, far, table, R, 0.0, plane_strain, stick) for x in d])
+    assert force[d[:, 0] < 0][-1, 0] > 3e-3
+    assert not force[-1].any()
+    way = np.linalg.norm(np.diff(d, axis=0), axis=1)
+    change = np.linalg.norm(np.diff(force, axis=0), axis=1)
+    assert (change < 4 * plane_strain * R * way).all()  # twice the dent's stiffness, as wide as the tip

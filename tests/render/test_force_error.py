@@ -11,7 +11,11 @@ import trimesh
 from palpate import render
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.fem.renderer import FemRenderer
-from palpate.render.force_error import error_figures, force_errors, law_share
+from palpate.render.force_error import error_figures, force_errors, law_share, place_numbers
+from palpate.render.press import Stroke, press
+from palpate.render.scene import in_the_air
+
+from . import shapes
 
 
 def test_the_law_is_surer_on_flat_ground_than_deep_on_a_bump_or_beside_a_rim():
@@ -27,6 +31,18 @@ def test_the_law_is_less_sure_of_a_compressible_solid_and_of_a_deep_slippery_tip
         float(law_share(x, 0, 0, 0, 0, friction=mu)) for x, mu in ((0.2, 1.0), (2.0, 1.0), (2.0, 0.05))
     )
     assert deep > 1.5 * shallow and slippery > 1.1 * deep
+
+
+def test_a_force_on_a_body_that_bends_is_as_sure_as_its_bending_and_not_as_its_dent():
+    """1.8 times the force was stated for the side of a slender body, whose bending its elements solve."""
+    width, height, at, radius = 0.010, 0.050, 0.040, 0.005
+    beam = shapes.fem(shapes.model(shapes.block((width, width, height), (2, 2, 10)), modulus=5e3))
+    curve = press(in_the_air(beam), np.array([0, 0, at]), np.array([-1.0, 0, 0]), Stroke(2e-3, 0.02))
+    place = int(np.argmin(np.linalg.norm(beam.contact.arrays.vertices - [width / 2, 0, at], axis=1)))
+    bent, aside, *_ = place_numbers(beam, radius, np.array([place]))[:, 0]
+    assert aside == pytest.approx(3 * width / (4 * at), rel=0.3)  # a cantilever's, which has no shear or dent
+    stated = curve.error_figures["force_error_n"] / np.linalg.norm(curve.force, axis=1).max()
+    assert 0.01 < stated < 0.2
 
 
 def test_error_grows_with_the_force_and_is_told_in_its_three_parts(block_renderer):

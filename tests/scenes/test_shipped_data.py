@@ -18,8 +18,9 @@ from palpate.reconstruction.pipeline import reconstruct
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.surface.felt_surface import PRESSES, felt_surface, with_own_stiffness
 from palpate.scenes import shipped
-from palpate.scenes.build import folder_name, model_of
+from palpate.scenes.build import model_of
 from palpate.scenes.embedded import embedded_recording
+from palpate.scenes.kept import folder_name
 from palpate.scenes.scene import load_scene
 from tools.shipped_models import SHIPPED
 

@@ -7,8 +7,10 @@ import pytest
 import trimesh
 
 import palpate as pp
+from palpate.mechanics.compliance.sites import SURFACE_EDGE_M
+from palpate.mechanics.shape import refine
 from palpate.mechanics.shape.refine import typical_wall
-from palpate.scenes.build import CoarserMesh
+from palpate.scenes.meshed import CoarserMesh
 
 
 def _tube(wall_m: float) -> trimesh.Trimesh:
@@ -45,6 +47,17 @@ def test_a_surface_that_is_not_halved_is_said(monkeypatch):
     monkeypatch.setattr("palpate.mechanics.shape.refine.MOST_TETRAHEDRA", 100)
     with pytest.warns(CoarserMesh, match="near a rim or the base"):
         pp.model_of(block)
+
+
+def test_the_surface_of_a_model_is_halved_once(monkeypatch):
+    block = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
+    block.apply_translation([0, 0, 0.02])
+    halved, rounds = refine._halved, []
+    monkeypatch.setattr(refine, "_halved", lambda *given: rounds.append(given) or halved(*given))
+    model = pp.model_of(block)
+    made = len(rounds)
+    refine.refined_near_surface(model.mesh, SURFACE_EDGE_M)
+    assert made == len(rounds) - made > 0
 
 
 @pytest.mark.slow

@@ -11,7 +11,8 @@ from palpate.mechanics.errors import SceneError
 from palpate.mechanics.model.material import ObjectMaterial, balls_ratio
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.shape.tetmesh import box_mesh
-from palpate.scenes.build import keep, model_of
+from palpate.scenes.build import model_of
+from palpate.scenes.kept import keep
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import ball_of, load_scene, read_scene, scene_names
 from palpate.scenes.virtual_presses import ExplorationOptions, base_tracing, explore, spread_places
