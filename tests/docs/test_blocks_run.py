@@ -36,7 +36,7 @@ def a_robots_table(folder: Path) -> None:
     """The embedded recording as another program wrote it: mm, and the force on the object."""
     seen = pp.read_recording("silicone-1-cylinder")
     rows = np.column_stack([seen.t, 1e3 * seen.position, -seen.force_on_tool])[::2]
-    np.savetxt(folder / "robot.csv", rows, "%.5f", ",", header="time,x,y,z,Fx,Fy,Fz", comments="")
+    np.savetxt(folder / "robot.csv", rows, "%.5f", ",", header="time,x_mm,y_mm,z_mm,Fx,Fy,Fz", comments="")
 
 
 def an_array(folder: Path) -> None:
