@@ -71,11 +71,13 @@ def _averaged(*arrays: np.ndarray, site: np.ndarray) -> tuple[np.ndarray, ...]:
     return tuple(np.column_stack([np.bincount(group, weights=c) for c in a.T]) / size for a in arrays)
 
 
-def forces_of(law: OneDLaws, presses: Presses) -> np.ndarray:
-    """(n, 3) N of every row, along the normal: a law of each press, (p,) columns."""
+def forces_of(law: OneDLaws, presses: Presses, moved_m: np.ndarray | None = None) -> np.ndarray:
+    """(n, 3) N of every row, along the normal: a law of each press, (p,) columns. moved_m: (p,) by how much
+    earlier each press meets the surface than it says."""
     k, b, r, s = (column[presses.press] for column in law)
-    inside = presses.depth > 0
-    safe = np.where(inside, presses.depth, 1.0)
+    u = presses.depth if moved_m is None else presses.depth + moved_m[presses.press]
+    inside = u > 0
+    safe = np.where(inside, u, 1.0)
     push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate, 0.0), 0.0)
     return push[:, None] * presses.normal[presses.press]
 
