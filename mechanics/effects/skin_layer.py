@@ -36,10 +36,6 @@ def film_factor(
     return modulus_ratio**weight
 
 
-_FAR_SHARE = 0.3
-"""Of the change that the elements' energies say: what lies within the dent's own reach is no far field."""
-
-
 def _set(touch: TouchTerms, skin: Skin, model: Model) -> None:
     contact = model.tool.tip_radius_m * np.sqrt(np.maximum(grid(), 1e-6))
 
@@ -65,7 +61,7 @@ def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) 
     thickness, depth = skin.thickness_m, energy_fields(places).depth
     inside = np.clip(thickness / np.maximum(depth, 1e-6), 0, 1) * (depth < 2 * thickness)
     changed = far_with_weights(places, 1 + inside * (1 / skin.modulus_ratio - 1))
-    settings.far = settings.far + _FAR_SHARE * (changed - places.far)
+    settings.far = settings.far + changed - places.far
 
 
 EFFECT = Effect(
