@@ -66,13 +66,20 @@ class ContactEnergies:
         """((q, 3, 3), (2, q)) 1/m that a ball's points hold, under the deeper contact, local frames, and of
         unit normal loads under both."""
         felt, share = self.inside(centre, radius)
-        normal = self.normal[:, :, felt] @ share.astype(np.float32)
+        normal = self._pushed(felt, share)
         element, at = np.unique(felt // (len(self.point) // len(self.fields.centroid)), return_inverse=True)
         own = np.zeros((self.normal.shape[1], len(element)))
         np.add.at(own.T, at, (self.normal[1][:, felt] * share).T)
         energy = self.fields.energy[:, element]
         times = own / np.maximum(energy[:, :, 0, 0], 1e-30)
         return np.einsum("qm,qmij->qij", times, energy), normal.astype(float)
+
+    def pushed(self, centre: np.ndarray, radius: float) -> np.ndarray:
+        """(2, q) 1/m that a ball's points hold, of unit normal loads under both contacts."""
+        return self._pushed(*self.inside(centre, radius))
+
+    def _pushed(self, felt: np.ndarray, share: np.ndarray) -> np.ndarray:
+        return self.normal[:, :, felt] @ share.astype(np.float32)
 
 
 def contact_energies(places: Places) -> ContactEnergies:

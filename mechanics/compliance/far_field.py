@@ -53,11 +53,6 @@ class EnergyFields:
         return self.energy.sum(axis=1, dtype=float)
 
     @cached_property
-    def blur(self) -> float:
-        """m, one and a half edges of the middle element: what is finer is not drawn in the elements."""
-        return float(np.cbrt(np.median(self.volume))) * 1.5
-
-    @cached_property
     def _by_element(self) -> np.ndarray:
         """(m, 6 q) of the tensors' six numbers, so that a weighed sum reads no more, and in one go."""
         q, m = self.energy.shape[:2]

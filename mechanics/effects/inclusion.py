@@ -176,8 +176,7 @@ def _seek(scene: TouchedScene, misfit: Misfit) -> list[np.ndarray]:
     for radius in RADII_M:
         held = np.minimum(radius, deep)
         for centre, own, close in zip(centres, held, _nearness(centres, held, places), strict=True):
-            felt, share = energies.inside(centre, own)
-            energy = energies.normal[:, :, felt].mean(axis=0) @ share.astype(np.float32)
+            energy = energies.pushed(centre, own).mean(axis=0)
             for log_ratio in LOG_RATIOS:
                 # the share of the give that goes with the ball
                 gone = misfit.answer * _change_of(log_ratio, close) * energy[places.place]

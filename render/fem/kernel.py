@@ -107,9 +107,12 @@ little strain. The demo's cylinder gives 0.4 in the middle and 2 at most, a tent
 def _has_left(p, state, tips, i):
     """Whether tip i has strayed from its anchor: of the object at rest, and on a slender body, which bends
     after a tip that it holds, also of the object as the last tick moved it there."""
+    point, normal, radius, weights = state.points[i], state.normals[i], state.radii_m[i], state.vectors[0]
+    if not strayed(p.surface, tips[i], point, normal, radius, weights, state.stack):
+        return False
     frame, far, force, moved = state.frames[i], state.local_far[i], state.elastic[i], state.vectors[1]
     for k in range(3):
-        moved[k] = 0.0
+        moved[k] = tips[i, k] + state.carried[k, i]
     give = 0.0
     for r in range(3):
         away = 0.0
@@ -119,19 +122,9 @@ def _has_left(p, state, tips, i):
                 away += far[r, c] * frame[c, k] * force[k]
         for k in range(3):
             moved[k] += away * frame[r, k]
-    radius = state.radii_m[i]
-    bends = np.sqrt(give) * state.young[i] * radius > BENDS
-    for k in range(3):
-        moved[k] = tips[i, k] + moved[k] + state.carried[k, i]
-    at_rest = strayed(
-        p.surface, tips[i], state.points[i], state.normals[i], radius, state.vectors[0], state.stack
-    )
-    return at_rest and not (
-        bends
-        and not strayed(
-            p.surface, moved, state.points[i], state.normals[i], radius, state.vectors[0], state.stack
-        )
-    )
+    if np.sqrt(give) * state.young[i] * radius <= BENDS:
+        return True
+    return strayed(p.surface, moved, point, normal, radius, weights, state.stack)
 
 
 SWEEPS = 60
