@@ -12,7 +12,7 @@ from palpate.mechanics.presses.repeats import SITE_M, sites_of
 from palpate.mechanics.presses.table import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import ON_SUPPORT, TimeSegment, runs
-from palpate.mechanics.statistics import read_columns, spread_about_zero
+from palpate.mechanics.statistics import spread_about_zero
 
 AROUND_S = 0.3
 """Samples are kept this long before first and after last touch."""
@@ -68,8 +68,12 @@ def free_segments(
     return tuple(TimeSegment("free", float(t[a]), float(t[b - 1])) for a, b in runs(free) if b > a + 1)
 
 
-def measured_noise(recording: Recording, free: np.ndarray, usual_n: float = USUAL_NOISE_N) -> Noise:
+def measured_noise(
+    recording: Recording, free: np.ndarray, read_n: np.ndarray, usual_n: float = USUAL_NOISE_N
+) -> Noise:
     """The noise in free air, (n,) bool; the stated (or the usual) value, white, where there is too little.
+
+    read_n: (n, 3) N, what the air reads beside it: level, drift, and a tool's weight and inertia.
 
     A recording that was read more slowly than it is sampled ([recording] read_rate_hz) has no more noise
     than its readings had, and that lasts from one reading to the next.
@@ -81,13 +85,15 @@ def measured_noise(recording: Recording, free: np.ndarray, usual_n: float = USUA
         lasting = min(1.0, held / per_step)
         step = stated * np.sqrt(max(lasting, 1 / per_step))
         return Noise(stated, step, float(np.clip(held / per_step, 1.0, 10.0)))
-    force = read_columns(recording.force_on_tool)
+    axes = np.ptp(recording.force_on_tool, axis=0) > 0  # a machine of one axis reads nothing of the others
+    force = recording.force_on_tool[:, axes]
     if free.sum() < 200 * per_step or not force.size:
         return Noise(stated, stated / np.sqrt(per_step), 1.0)
     steps = np.diff(force, axis=0)[free[1:] & free[:-1]]
     white = max(_robust_std(steps) / np.sqrt(2), 1e-4)
-    line = np.polyfit(recording.t[free], force[free], 1)
-    left = force - (recording.t[:, None] * line[0] + line[1])
+    left = force - read_n[:, axes]
+    line = np.polyfit(recording.t[free], left[free], 1)
+    left -= recording.t[:, None] * line[0] + line[1]
     stretches = runs(free)
 
     def of_means(size: int) -> float:
@@ -204,7 +210,7 @@ def segment_recording(
     )
     quiet = table.within("free", t)
     return dataclasses.replace(
-        table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet, noise)
+        table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet, free, noise)
     )
 
 

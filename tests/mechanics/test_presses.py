@@ -60,6 +60,16 @@ def test_a_table_knows_touch_depth_site_and_noise():
     assert not presses.t.flags.writeable
 
 
+def test_what_a_swung_tool_reads_is_no_noise():
+    """80 g at 2 m/s^2 and 5 mN: with what it reads in the air taken off, the noise is the sensor's."""
+    made = recording(noise=0.005)
+    read = 0.16 * np.sin(np.array([9.0, 7.0, 11.0]) * made.t[:, None])
+    noise = table(dataclasses.replace(made, force_on_tool=made.force_on_tool + read), free_air=read).noise
+    assert noise.raw_n == pytest.approx(0.005, rel=0.05)
+    assert noise.step_n == pytest.approx(0.005 / np.sqrt(10), rel=0.1)
+    assert noise.variance_inflation < 1.5
+
+
 def test_rows_are_seen_from_the_place_that_was_touched():
     presses = table(recording(noise=0.0))
     assert presses.travel[:, 0] == pytest.approx(presses.depth, abs=1e-12)
