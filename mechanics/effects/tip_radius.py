@@ -28,5 +28,7 @@ EFFECT = Effect(
         stands_for_strain=True,
         # a site law that bends a little differently looks like another tip
         systematic=(0.1,),
+        # rms of ten sound objects of the laboratory, pressed with 100 to 500 times the noise
+        untold=(0.075,),
     ),
 )

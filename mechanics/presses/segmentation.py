@@ -141,11 +141,13 @@ class FoundPresses:
 @dataclass(frozen=True)
 class FoundAround:
     """What was found of a recording beside its presses. free_air: (n, 3) N, as late as the force; None: 0.
+    followed: it goes after whatever the air reads, noise too, not only a level, a drift and a tool.
     trace_s: when the base was traced. others_s: further contacts, which are neither presses nor free air.
     supported: segments on the support. noise_n: N, of a sample; None: the stated or a usual one. delay_s: by
     which the force reads late, and its standard error."""
 
     free_air: np.ndarray | None = None
+    followed: bool = False
     trace_s: tuple[float, float] | None = None
     others_s: Sequence[tuple[float, float]] = ()
     supported: Sequence[TimeSegment] = ()
@@ -209,8 +211,9 @@ def segment_recording(
         recording=recording.content,
     )
     quiet = table.within("free", t)
+    read_n = np.zeros_like(free) if around.followed else free
     return dataclasses.replace(
-        table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet, free, noise)
+        table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet, read_n, noise)
     )
 
 

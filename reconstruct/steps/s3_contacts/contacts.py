@@ -229,6 +229,7 @@ def _tabled(
         ),
         FoundAround(
             free_air=_later(t, found.spans.filtered.free_air, -delay_s, recording.sample_rate_hz),
+            followed=found.spans.filtered.followed,
             trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
             others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
             supported=found.supported,
