@@ -53,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which shapes, how many sizes and places."""
     parser.add_argument("--only", default="", help="shapes whose name holds this (default: all)")
     parser.add_argument("--first", type=int, default=len(ZOO), help="so many of them (default: all)")
+    parser.add_argument("--every", type=int, default=1, help="of these each so many-th (default: 1)")
     parser.add_argument("--sizes", type=int, choices=(1, 2), default=2, help="of the mesh (default: 2)")
     parser.add_argument("--places", type=int, default=8, help="pressed on each; 0: none (default: 8)")
     parser.add_argument("--solved", type=int, default=1, help="of them solved too (default: 1)")
@@ -61,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """{"shapes": {name: what became of it}, "figures"}; a line is printed for each shape."""
-    chosen = [name for name in ZOO if arguments.only in name][: arguments.first]
+    chosen = [name for name in ZOO if arguments.only in name][: arguments.first : arguments.every]
     setting = (arguments.sizes, arguments.places, arguments.solved)
     shapes: dict[str, dict[str, Any]] = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -43,8 +43,9 @@ def test_what_lies_under_a_place_is_the_object_and_not_the_triangle_that_it_is_i
 
 def test_a_stopped_run_goes_on_where_it_was(tmp_path, monkeypatch):
     arguments = argparse.Namespace(
-        only="two blocks touching", first=60, sizes=1, places=0, solved=0, work=str(tmp_path / "kept.jsonl")
-    )
+        only="two blocks touching", first=60, every=1, sizes=1, places=0, solved=0,
+        work=str(tmp_path / "kept.jsonl"),
+    )  # fmt: skip
     first = run(arguments)
     monkeypatch.setattr(mesh_zoo, "tried", lambda *_: pytest.fail("it was meshed again"))
     assert run(arguments)["shapes"] == first["shapes"]
