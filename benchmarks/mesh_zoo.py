@@ -136,7 +136,8 @@ def _cure(said: str) -> dict[str, Any] | None:
         return {"young_modulus_pa": 20e3}
     flags = re.findall(r"--(sink|mesh-size|up|unit)[ =]([-+\w.,]+)", said.split("' ", 1)[-1])
     if not flags:
-        return None
+        left_out = re.findall(r"--modulus '?([^'=]+)=0", said)
+        return {"young_modulus_pa": dict.fromkeys(left_out, 0.0)} if left_out else None
     flag, value = flags[-1]
     name, kind = _TAKEN[flag]
     return {name: kind(value.rstrip(".,"))}

@@ -21,7 +21,7 @@ TEN = (
     "dome, inside out",
     "dome, triangles of no area",
     "dome in inches",
-    "dome with specks",
+    "block and one hanging",
 )
 
 
@@ -65,6 +65,10 @@ def test_there_are_sixty():
         ("'a' is 60 m across: these look like mm: give --unit mm", {"unit": "mm"}),
         ("'a': its flat foot is for --up=0.1,-0.2,1; or turn it", {"up": "0.1,-0.2,1"}),
         ("say --modulus 'body 1=PA', or --modulus PA, one for all", {"young_modulus_pa": 20e3}),
+        (
+            "turn it (--up); or leave out what hangs, --modulus 'body 2=0'",
+            {"young_modulus_pa": {"body 2": 0}},
+        ),
         ("it encloses no volume", None),
     ],
 )
