@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
-from palpate.mechanics.compliance.sites import contact_curvature
+from palpate.mechanics.compliance.sites import contact_curvature, uneven_curvature
 from palpate.mechanics.contact.edges import nearness
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
@@ -115,9 +115,9 @@ def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOpti
 def place_numbers(
     renderer: FemRenderer, tip_radius_m: float, vertices: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
-    """(4, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
+    """(5, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
     radius; how far a push along the normal moves the surface sideways (`way_aside`); how near a rim and how
-    near the base it is (mechanics.contact.edges.nearness)."""
+    near the base it is (mechanics.contact.edges.nearness); `uneven_curvature` times the tip's radius."""
     surface, mesh, parameters = renderer.contact.arrays, renderer.model.mesh, renderer.parameters
     points, normals, far = surface.vertices[vertices], surface.normals[vertices], renderer.far_at(vertices)
     along = np.einsum("vab,vb->va", far, normals)
@@ -125,7 +125,8 @@ def place_numbers(
     sideways = np.linalg.norm(along - give[:, None] * normals, axis=1)
     bent = np.abs(parameters.curvature[vertices])
     rim, base = nearness(mesh, points, normals)
-    return np.stack([bent * tip_radius_m, way_aside(give, sideways, tip_radius_m), rim, base])
+    uneven = uneven_curvature(mesh, points, normals, tip_radius_m) * tip_radius_m
+    return np.stack([bent * tip_radius_m, way_aside(give, sideways, tip_radius_m), rim, base, uneven])
 
 
 def way_aside(give: np.ndarray, sideways: np.ndarray, tip_radius_m: float | np.ndarray) -> np.ndarray:
@@ -138,7 +139,7 @@ def way_aside(give: np.ndarray, sideways: np.ndarray, tip_radius_m: float | np.n
 
 
 def rendered_share(renderer: FemRenderer, depth: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (4, ...), place_numbers."""
+    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (5, ...), place_numbers."""
     given = renderer.parameters
     nu, mu = float(given.poisson_ratio[0]), float(given.friction[0])
     return law_share(depth, *numbers, poisson_ratio=nu, friction=mu)
@@ -150,11 +151,12 @@ def law_share(
     sideways: np.ndarray,
     rim: np.ndarray,
     base: np.ndarray,
+    uneven: np.ndarray | float = 0.0,
     *,
     poisson_ratio: float = USUAL_POISSON_RATIO,
     friction: float = np.inf,
 ) -> np.ndarray:
-    """Half width of the law's 95 % interval over the force; depth in tip radii, the next four: place_numbers;
+    """Half width of the law's 95 % interval over the force; depth in tip radii, the next five: place_numbers;
     friction: Coulomb's coefficient."""
     terms = (
         Bound.floor.value,
@@ -163,6 +165,7 @@ def law_share(
         Bound.sideways.value * sideways,
         Bound.rim.value * rim,
         Bound.base.value * base,
+        Bound.uneven.value * uneven,
         Bound.ratio.value * max(USUAL_POISSON_RATIO - poisson_ratio, 0.0),
         Bound.slip.value * np.exp(-friction / Bound.slippery.value) * depth,
     )
