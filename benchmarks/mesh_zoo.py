@@ -232,7 +232,7 @@ def _figures(shapes: dict[str, dict[str, Any]]) -> list[Figure]:
         within = float((np.abs(solver[:, 0]) <= solver[:, 1]).mean())
         what = f"forces within the stated width of the solved press, of {len(solver)}"
         figures.append(Figure(what, within).at_least(0.95))
-        figures.append(_spread("force over the solved press's, less 1", solver[:, 0]))
+        figures.append(_spread("force less the solved press's, of the force", solver[:, 0]))
     return figures
 
 
