@@ -183,7 +183,7 @@ def _specks() -> Drawn:
 
 def _hanging() -> Drawn:
     """A block, and another that hangs in the air beside it."""
-    return Drawn(together([box((60, 60, 30)), box((30, 30, 20), (60, 0, 40))]), None)
+    return Drawn(together([box((60, 60, 30)), box((30, 30, 20), (60, 0, 40))]), 60 * 60 * 30)
 
 
 def _in(unit: str, millimetres: float) -> Drawn:

@@ -153,8 +153,7 @@ def compare(models: list[Model], count: int, solved: int) -> dict[str, Any]:
         if place is None:
             said.append(words)
             continue
-        off = place.law_n[-1] / place.solved_n[-1] - 1
-        exact.append([off, place.error_n[-1] / place.law_n[-1]])
+        exact.append([1 - place.solved_n[-1] / place.law_n[-1], place.error_n[-1] / place.law_n[-1]])
     pressed_both = np.isfinite(forces).all(axis=0)
     sizes = forces[1:, pressed_both] / forces[0, pressed_both] - 1
     return {

@@ -8,12 +8,14 @@ how far an option may be set, in `mechanics.options`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from palpate.mechanics.disk.schema import FileKey
 
 YOUNG_MODULUS = FileKey(low=1.0, high=1e9, unit="Pa", required=True)
 """From the softest gel to stiff rubber."""
+PART_MODULUS = replace(YOUNG_MODULUS, low=0.0)
+"""Of a part of a mesh: what has none exerts no force, and is left out."""
 POISSON_RATIO = FileKey(low=0.0, high=0.4999)
 """The one range of Poisson's ratio. Below 0 there is no soft solid that a hand explores, and the tables of
 the dent (from 0.10 on for 'linear', from 0.40 on for 'neo-hookean', extended in a straight line) know

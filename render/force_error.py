@@ -13,12 +13,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
-from palpate.mechanics.compliance.sites import contact_curvature
+from palpate.mechanics.compliance.near_field import contact_width
+from palpate.mechanics.compliance.sites import contact_curvature, uneven_curvature
 from palpate.mechanics.contact.edges import nearness
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO
+from palpate.mechanics.shape.nearest import first_hits
 from palpate.render.base import Renderer
 from palpate.render.effects import rendered_touch
 from palpate.render.fem.renderer import FemRenderer
@@ -29,6 +31,8 @@ from palpate.render.surface.snapping import ONSET_NOISE_M, is_given
 SURE = 1.96
 COARSE_DEPTH, _STEPS = 0.6, 7
 """Of the press by which a coarse table's error is stated, in tip radii; and its steps."""
+_SAGITTA = 0.05
+"""Tip radii: what is as near is the surface itself, or the support."""
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
 
@@ -115,9 +119,10 @@ def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOpti
 def place_numbers(
     renderer: FemRenderer, tip_radius_m: float, vertices: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
-    """(4, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
+    """(6, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
     radius; how far a push along the normal moves the surface sideways (`way_aside`); how near a rim and how
-    near the base it is (mechanics.contact.edges.nearness)."""
+    near the base it is (mechanics.contact.edges.nearness); `uneven_curvature` times the tip's radius; how
+    wide a contact is beside a wall (`_through`)."""
     surface, mesh, parameters = renderer.contact.arrays, renderer.model.mesh, renderer.parameters
     points, normals, far = surface.vertices[vertices], surface.normals[vertices], renderer.far_at(vertices)
     along = np.einsum("vab,vb->va", far, normals)
@@ -125,7 +130,23 @@ def place_numbers(
     sideways = np.linalg.norm(along - give[:, None] * normals, axis=1)
     bent = np.abs(parameters.curvature[vertices])
     rim, base = nearness(mesh, points, normals)
-    return np.stack([bent * tip_radius_m, way_aside(give, sideways, tip_radius_m), rim, base])
+    uneven = uneven_curvature(mesh, points, normals, tip_radius_m) * tip_radius_m
+    wall = _through(renderer.model, points, normals, tip_radius_m)
+    return np.stack([bent * tip_radius_m, way_aside(give, sideways, tip_radius_m), rim, base, uneven, wall])
+
+
+def _through(model: Model, points: np.ndarray, normals: np.ndarray, tip_radius_m: float) -> np.ndarray:
+    """(k,) squared, the width of a contact over the thickness of a known shape's wall with air behind it; 0
+    over the support, or where no shape is known."""
+    shape, width = model.mesh.shape, contact_width(tip_radius_m)
+    if shape is None or not len(points):
+        return np.zeros(len(points))
+    # rays meet the triangles, which lie a little beside the curved shape's places
+    thick = first_hits(shape.vertices, shape.triangles, points, -normals, beyond=_SAGITTA * tip_radius_m)[0]
+    free = np.isfinite(thick)
+    behind = points[free] - thick[free, None] * normals[free]
+    free[free] = model.support.height(behind) > _SAGITTA * tip_radius_m
+    return np.where(free, np.square(width / np.where(free, thick, 1.0)), 0.0)
 
 
 def way_aside(give: np.ndarray, sideways: np.ndarray, tip_radius_m: float | np.ndarray) -> np.ndarray:
@@ -138,7 +159,7 @@ def way_aside(give: np.ndarray, sideways: np.ndarray, tip_radius_m: float | np.n
 
 
 def rendered_share(renderer: FemRenderer, depth: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (4, ...), place_numbers."""
+    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (6, ...), place_numbers."""
     given = renderer.parameters
     nu, mu = float(given.poisson_ratio[0]), float(given.friction[0])
     return law_share(depth, *numbers, poisson_ratio=nu, friction=mu)
@@ -150,11 +171,13 @@ def law_share(
     sideways: np.ndarray,
     rim: np.ndarray,
     base: np.ndarray,
+    uneven: np.ndarray | float = 0.0,
+    wall: np.ndarray | float = 0.0,
     *,
     poisson_ratio: float = USUAL_POISSON_RATIO,
     friction: float = np.inf,
 ) -> np.ndarray:
-    """Half width of the law's 95 % interval over the force; depth in tip radii, the next four: place_numbers;
+    """Half width of the law's 95 % interval over the force; depth in tip radii, the next six: place_numbers;
     friction: Coulomb's coefficient."""
     terms = (
         Bound.floor.value,
@@ -163,6 +186,8 @@ def law_share(
         Bound.sideways.value * sideways,
         Bound.rim.value * rim,
         Bound.base.value * base,
+        Bound.uneven.value * uneven,
+        Bound.wall.value * wall,
         Bound.ratio.value * max(USUAL_POISSON_RATIO - poisson_ratio, 0.0),
         Bound.slip.value * np.exp(-friction / Bound.slippery.value) * depth,
     )

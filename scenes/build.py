@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.disk.mesh_parts import words_of
+from palpate.mechanics.disk.surface_files import ClosedSurface
 from palpate.mechanics.errors import SceneError
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.material import Ball, ObjectMaterial
@@ -21,11 +22,11 @@ from palpate.mechanics.model.model import Model, Tool
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.recording.recording import read_recording
-from palpate.mechanics.shape.flat_foot import Standing, direction, standing
+from palpate.mechanics.shape.flat_foot import HangingError, Standing, direction, standing
 from palpate.scenes.kept import folder_of, kept_model, recording_path
 from palpate.scenes.meshed import meshed
 from palpate.scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
-from palpate.scenes.regions import moduli_of, ratio_of
+from palpate.scenes.regions import flags_of, left_in, moduli_of, ratio_of
 from palpate.scenes.scene import Scene, ball_of
 from palpate.scenes.shipped import shipped_model
 
@@ -97,6 +98,9 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
     from palpate.reconstruction.geometry.filled import solid_of
 
     surface = solid_of(shape, scene.unit, direction(scene.up))
+    surface, stated = left_in(surface, scene.young_modulus_pa)
+    scene = replace(scene, young_modulus_pa=stated)
+    stood = _stood(surface, scene)
     moduli: dict[str, float] = {}
     if surface.parts or isinstance(scene.young_modulus_pa, Mapping):
         moduli = moduli_of(surface.parts, scene.young_modulus_pa, surface.name)
@@ -111,7 +115,18 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
         "modulus_of": next(iter(moduli), ""),
     }
     field = partial(ratio_of, parts=surface.parts, moduli=moduli) if moduli else None
-    return meshed(scene, standing(surface, scene.up, scene.sink_m), own, about, progress, field)
+    return meshed(scene, stood, own, about, progress, field)
+
+
+def _stood(surface: ClosedSurface, scene: Scene) -> Standing:
+    """The surface on its support; a refusal of parts that hang in the air names how they are left out."""
+    try:
+        return standing(surface, scene.up, scene.sink_m)
+    except HangingError as error:
+        if not error.parts:
+            raise
+        flags = flags_of(error.parts, "0")
+        raise HangingError(f"{error}; or leave out what hangs, {flags}", error.parts) from error
 
 
 def _balls(regions: Collection[Region]) -> dict[str, Ball]:

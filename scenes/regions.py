@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shlex
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from palpate.mechanics.disk.mesh_parts import Part, shares, words_of
+from palpate.mechanics.disk.surface_files import ClosedSurface, without_parts
 from palpate.mechanics.errors import OptionError, PalpateWarning
 from palpate.mechanics.model.material import MODULUS_LIMITS, mixed_of, points_inside
 from palpate.mechanics.names import unknown
@@ -22,6 +23,38 @@ class LimitedModulus(PalpateWarning):
     """A part is harder or softer than a model holds."""
 
 
+def left_in(
+    surface: ClosedSurface, stated: float | Mapping[str, float] | None
+) -> tuple[ClosedSurface, float | Mapping[str, float] | None]:
+    """A surface without its parts of modulus 0, and the moduli as they were stated of the others.
+
+    Raises OptionError where a name is no part's, SurfaceError where no part is left."""
+    gone = [] if not isinstance(stated, Mapping) else [name for name, pa in stated.items() if pa == 0]
+    if not isinstance(stated, Mapping) or not gone:
+        return surface, stated
+    _check_names(stated, surface.parts, surface.name)
+    left = {name: pa for name, pa in stated.items() if name not in gone}
+    rest = without_parts(surface, gone)
+    if rest.parts:
+        return rest, left
+    (only,) = (part.name for part in surface.parts if part.name not in gone)
+    return rest, left.get(only, left.get(REST))
+
+
+def _check_names(stated: Iterable[str], parts: Sequence[Part], name: str) -> None:
+    names = [part.name for part in parts]
+    for each in stated:
+        if each != REST and each not in names:
+            if not parts:
+                raise OptionError(f"'{name}' holds one body, and no part '{each}': say --modulus PA")
+            raise OptionError(f"{unknown(each, 'part', names)}: '{name}' holds {words_of(parts)}")
+
+
+def flags_of(names: Iterable[str], modulus: str) -> str:
+    """As the modulus of parts is typed."""
+    return " ".join(f"--modulus {shlex.quote(f'{name}={modulus}')}" for name in names)
+
+
 def moduli_of(
     parts: Sequence[Part], stated: float | Mapping[str, float] | None, name: str
 ) -> dict[str, float]:
@@ -32,16 +65,12 @@ def moduli_of(
     """
     if stated is not None and not isinstance(stated, Mapping):
         return {}
+    _check_names(stated or {}, parts, name)
     stated, names = dict(stated or {}), [part.name for part in parts]
     rest = stated.pop(REST, None)
-    for each in stated:
-        if each not in names:
-            if not parts:
-                raise OptionError(f"'{name}' holds one body, and no part '{each}': say --modulus PA")
-            raise OptionError(f"{unknown(each, 'part', names)}: '{name}' holds {words_of(parts)}")
     left = [each for each in names if each not in stated]
     if left and rest is None:
-        flags = " ".join(f"--modulus {shlex.quote(f'{each}=PA')}" for each in left)
+        flags = flags_of(left, "PA")
         one = "" if stated else ", or --modulus PA, one for all"
         raise OptionError(f"'{name}' holds {words_of(parts)}, of what modulus is each: say {flags}{one}")
     order = sorted(parts, key=lambda part: -part.volume_m3)

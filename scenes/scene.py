@@ -8,8 +8,8 @@ A TOML file whose keys carry their units. Allowed tables and keys:
     mesh (a
                  surface or mesh file in its own frame; unit, up, sink_m), model (a MODEL folder) or
                  recording; young_modulus_pa, poisson_ratio, mesh_size_m, finite_strain
-    [[part]]     name, young_modulus_pa: of a body or label of the mesh; [object] young_modulus_pa is of the
-                 others
+    [[part]]     name, young_modulus_pa: of a body or label of the mesh, 0 leaves it out; [object]
+                 young_modulus_pa is of the others
     [[inclusion]] name, centre_m, radius_m, modulus_ratio       (object frame: base's centre, z up; the file's
                  frame for a mesh)
     [tool]       tip_radius_m
@@ -33,7 +33,7 @@ from palpate.mechanics.disk.surface_files import SUFFIXES, is_surface_file
 from palpate.mechanics.errors import OptionError, SceneError
 from palpate.mechanics.model.material import BALL, Ball
 from palpate.mechanics.names import unknown
-from palpate.mechanics.plausible import POISSON_RATIO, SPHERE, TIP_RADIUS, YOUNG_MODULUS
+from palpate.mechanics.plausible import PART_MODULUS, POISSON_RATIO, SPHERE, TIP_RADIUS, YOUNG_MODULUS
 from palpate.scenes.embedded import embedded_names, embedded_recording
 from palpate.scenes.phantoms import PHANTOMS, Region
 from palpate.scenes.regions import REST
@@ -59,7 +59,7 @@ SCHEMA: Schema = {
         "up": FileKey(str),
         "sink_m": FileKey(low=0.0, high=0.1, unit="m"),
     },
-    "part": Listed({"name": FileKey(str, required=True), "young_modulus_pa": YOUNG_MODULUS}),
+    "part": Listed({"name": FileKey(str, required=True), "young_modulus_pa": PART_MODULUS}),
     "inclusion": Listed({**BALL, "name": FileKey(str)}),
     "tool": {"tip_radius_m": _OPTIONAL_TIP, "tip": SPHERE},
     "device": {

@@ -220,6 +220,26 @@ def contact_curvature(
     return ellipse_curvature(principal_curvatures(mesh, points, normals, tip_radius_m), tip_radius_m)
 
 
+_MIDDLE = 0.4
+"""Of a contact's width: what lies under its middle."""
+
+
+def uneven_curvature(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float
+) -> np.ndarray:
+    """(k,) 1/m by how much a known shape is curved otherwise under the middle of a contact than over all of
+    it, as in a groove as narrow as a tip; 0 where no shape is known, whose curvature is fitted to nodes."""
+    if mesh.shape is None or not len(points):
+        return np.zeros(len(points))
+    whole, middle = (
+        ellipse_curvature(
+            mesh.shape.curvatures(points, normals, share * contact_width(tip_radius_m))[0], tip_radius_m
+        )
+        for share in (1.0, _MIDDLE)
+    )
+    return np.abs(middle - whole)
+
+
 def principal_curvatures(
     mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
 ) -> np.ndarray:

@@ -7,8 +7,8 @@ triangles come out outward.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +58,23 @@ class ClosedSurface:
     def size_m(self) -> float:
         """Greatest extent along an axis, m."""
         return float(np.ptp(self.vertices, axis=0).max())
+
+
+def without_parts(surface: ClosedSurface, names: Collection[str]) -> ClosedSurface:
+    """The surface of the other parts; as of any file, it tells none apart where one is left.
+
+    Raises SurfaceError where none is."""
+    import trimesh
+
+    left = [part for part in surface.parts if part.name not in names]
+    if not left:
+        raise SurfaceError(f"of '{surface.name}' no part is left: leave some in")
+    shell = trimesh.util.concatenate(
+        [trimesh.Trimesh(part.vertices, part.triangles, process=False) for part in left]
+    )
+    rest = surface_of(shell)
+    notes = (*surface.notes, *rest.notes, f"{', '.join(names)} left out")
+    return replace(rest, name=surface.name, notes=notes, parts=tuple(left) if len(left) > 1 else ())
 
 
 def is_surface_file(path: Path | str) -> bool:

@@ -1,12 +1,5 @@
-"""A file's surface in small triangles that are cut apart along creases: what a felt surface is made of.
-
-A file is as coarse as its maker left it: 12 triangles for a box, strips as long as a wall for a cylinder.
-Vertex normals of such triangles bend plane faces, and the nearest of them is not the one whose middle is.
-
-The surface that a tip feels, curved between its fine vertices: where the nodes of a mesh belong.
-
-An object's own tetrahedra made fine under a tip: bisected (Rivara 1984), quadratic, curved.
-"""
+"""An object's own tetrahedra made fine under a tip: bisected (Rivara 1984), quadratic, their nodes on the
+curved surface that a tip feels."""
 
 from __future__ import annotations
 
@@ -14,135 +7,35 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from palpate.mechanics.elastic.elasticity import shape_derivatives
 from palpate.mechanics.errors import MeshError
-from palpate.mechanics.kernels import kernel
-from palpate.mechanics.shape.nearest import facings
-from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces, tet_volumes, vertex_normals
+from palpate.mechanics.shape.nearest import Closest
+from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces, tet_volumes
 from palpate.mechanics.shape.true_shape import TrueShape
-
-LONGEST_M = 0.003
-"""Longest edge."""
-_SAME_M, _SAME_TURN = 1.2345e-8, 1.2345e-3
-"""Corners this near, whose normals are this near, are one vertex; no round parts of a file's own lengths."""
-
-
-def even_surface(
-    vertices: np.ndarray, triangles: np.ndarray, longest_m: float = LONGEST_M
-) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) m and triangles (k, 3) on the shape whose file is (v, 3) m and (m, 3), closed, outward.
-
-    Triangles are halved until no edge of theirs in the file's plane exceeds longest_m. What is new lies on
-    the curved shape (mechanics.shape.true_shape), and the two sides of a crease share no vertices.
-    """
-    shape = TrueShape(vertices, triangles)
-    corner = shape.vertices[shape.triangles]
-    parent, weights = np.arange(len(corner)), np.tile(np.eye(3), (len(corner), 1, 1))
-    while True:
-        flat = np.einsum("kcw,kwx->kcx", weights, corner[parent])
-        length = np.linalg.norm(np.roll(flat, -1, axis=1) - flat, axis=2)
-        # neighbours agree on what is too long, so no corner ends on another's edge
-        long = np.flatnonzero(length.max(axis=1) > longest_m * (1 + 1e-9))
-        if not len(long):
-            break
-        turned = (length[long].argmax(axis=1)[:, None] + np.arange(3)) % 3
-        start, end, tip = np.moveaxis(weights[long[:, None], turned], 1, 0)
-        middle = (start + end) / 2
-        weights[long] = np.stack([start, middle, tip], axis=1)
-        weights = np.concatenate([weights, np.stack([middle, end, tip], axis=1)])
-        parent = np.concatenate([parent, parent[long]])
-    points, normals = shape.on(np.repeat(parent, 3), weights.reshape(-1, 3))
-    key = np.rint(np.hstack([points / _SAME_M, normals / _SAME_TURN])).astype(np.int64)
-    _, first, vertex = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    return points[first], vertex.reshape(-1, 3)
-
-
-_SMOOTH_COSINE = 0.85
-"""A vertex normal further than some 32 degrees from a triangle's own belongs to a crease: it stays flat."""
 
 
 class CurvedSurface:
-    """A closed surface of fine triangles, curved by its vertex normals; answers nearest-point questions.
+    """The curved shape (mechanics.shape.true_shape) whose file is vertices (v, 3) m and triangles (k, 3),
+    closed, outward; answers nearest-point questions."""
 
-    vertices: (v, 3) m. triangles: (k, 3), outward, none much longer than its neighbours. curved: False keeps
-    the triangles flat. Between vertices the surface is the mean of the point and its projections onto the
-    corners' tangent planes (Boubekeur & Alexa, Phong Tessellation, 2008, with their factor 1/2, which is
-    exact for a paraboloid).
-    """
-
-    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, *, curved: bool = True) -> None:
-        self.vertices = np.ascontiguousarray(vertices, dtype=float)
-        self.triangles = np.ascontiguousarray(triangles, dtype=np.int64)
-        corner = self.vertices[self.triangles]
-        self._tree = cKDTree(corner.mean(axis=1))
-        self._candidates = min(24, len(corner))
-        normals = vertex_normals(self.vertices, self.triangles)[self.triangles]
-        _, facing = facings(self.vertices, self.triangles)
-        smooth = np.einsum("kci,ki->kc", normals, facing) > _SMOOTH_COSINE
-        self._normals = np.where(smooth[..., None] & curved, normals, 0.0)
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray) -> None:
+        self._shape = TrueShape(vertices, triangles)
+        self._closest = Closest(self._shape.vertices, self._shape.triangles)
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
         """(k, 3) m, the places of the surface nearest to points (k, 3) m."""
-        points = np.ascontiguousarray(np.atleast_2d(points), dtype=float)
-        _, near = self._tree.query(points, k=self._candidates)
-        near = near.reshape(len(points), -1)
-        found, weights = np.empty_like(points), np.empty_like(points)
-        triangle = np.empty(len(points), dtype=np.int64)
-        _nearest(points, near, self.vertices, self.triangles, found, triangle, weights)
-        corner, normals = self.vertices[self.triangles[triangle]], self._normals[triangle]
-        over = np.einsum("kci,kci->kc", found[:, None] - corner, normals)
-        return found - 0.5 * np.einsum("kc,kc,kci->ki", weights, over, normals)
+        points = np.atleast_2d(points)
+        foot, normals = self._over(points)
+        # a patch is drawn out beside a round rim: what is over a place of its triangle lies aside of it
+        away = points - foot
+        aside = away - np.einsum("ki,ki->k", away, normals)[:, None] * normals
+        return self._over(points + aside)[0]
 
-
-@kernel
-def _nearest(points, near, vertices, triangles, found, triangle, weights):
-    """The nearest point of the candidate triangles `near` (k, c) to each point (Ericson 2005, 5.1)."""
-    for k in range(points.shape[0]):
-        least = np.inf
-        px, py, pz = points[k, 0], points[k, 1], points[k, 2]
-        for c in range(near.shape[1]):
-            t = near[k, c]
-            i, j, l = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-            ax, ay, az = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-            ux, uy, uz = vertices[j, 0] - ax, vertices[j, 1] - ay, vertices[j, 2] - az
-            vx, vy, vz = vertices[l, 0] - ax, vertices[l, 1] - ay, vertices[l, 2] - az
-            wx, wy, wz = px - ax, py - ay, pz - az
-            uu, uv, vv = ux * ux + uy * uy + uz * uz, ux * vx + uy * vy + uz * vz, vx * vx + vy * vy + vz * vz
-            uw, vw = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
-            area = uu * vv - uv * uv
-            s, r = vv * uw - uv * vw, uu * vw - uv * uw
-            if area > 0.0 and s >= 0.0 and r >= 0.0 and s + r <= area:
-                s /= area
-                r /= area
-            else:
-                # the nearest of the three edges
-                best = np.inf
-                s_best, r_best = 0.0, 0.0
-                for edge in range(3):
-                    if edge == 0:
-                        at = min(max(uw / max(uu, 1e-300), 0.0), 1.0)
-                        s, r = at, 0.0
-                    elif edge == 1:
-                        at = min(max(vw / max(vv, 1e-300), 0.0), 1.0)
-                        s, r = 0.0, at
-                    else:
-                        at = (uu - uv + vw - uw) / max(uu + vv - 2 * uv, 1e-300)
-                        at = min(max(at, 0.0), 1.0)
-                        s, r = 1.0 - at, at
-                    dx, dy, dz = wx - s * ux - r * vx, wy - s * uy - r * vy, wz - s * uz - r * vz
-                    away = dx * dx + dy * dy + dz * dz
-                    if away < best:
-                        best, s_best, r_best = away, s, r
-                s, r = s_best, r_best
-            dx, dy, dz = wx - s * ux - r * vx, wy - s * uy - r * vy, wz - s * uz - r * vz
-            away = dx * dx + dy * dy + dz * dz
-            if away < least:
-                least = away
-                triangle[k] = t
-                found[k, 0], found[k, 1], found[k, 2] = px - dx, py - dy, pz - dz
-                weights[k, 0], weights[k, 1], weights[k, 2] = 1.0 - s - r, s, r
+    def _over(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places (k, 3) m over those of the file's triangles nearest to points (k, 3) m, normals (k, 3)."""
+        _, triangle, weights = self._closest(points)
+        return self._shape.on(triangle, weights)
 
 
 GAUSS = np.full((4, 4), 0.1381966011250105)

@@ -10,7 +10,7 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.press_solver.body import BodyMaterial, PressedBody
 from palpate.mechanics.press_solver.contact import PressContact
 from palpate.mechanics.press_solver.equilibrium import PressPath, Settling
-from palpate.mechanics.press_solver.graded_mesh import CurvedSurface, drawn_to, even_surface, graded_mesh
+from palpate.mechanics.press_solver.graded_mesh import CurvedSurface, drawn_to, graded_mesh
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 _LONGEST = 1.3
@@ -88,7 +88,7 @@ class PressSolver:
         ratio: np.ndarray | None = None,
         options: PressOptions = PressOptions(),
     ) -> None:
-        self._surface = None if surface is None else CurvedSurface(*even_surface(*surface))
+        self._surface = None if surface is None else CurvedSurface(*surface)
         self.mesh = drawn_to(mesh, self._surface)
         self.young_modulus_pa, self.poisson_ratio = float(young_modulus_pa), float(poisson_ratio)
         self.tip_radius_m, self.options = float(tip_radius_m), options

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from palpate.mechanics.disk.surface_files import ClosedSurface
 from palpate.mechanics.errors import PalpateWarning, SurfaceError
@@ -39,6 +39,15 @@ class TiltedFoot(PalpateWarning):
     """The flat foot of an object does not lie on the stated plane."""
 
 
+class HangingError(SurfaceError):
+    """Bodies of a file hang in the air. parts: their names, where the file's parts are known and each hangs
+    whole."""
+
+    def __init__(self, message: str, parts: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.parts = parts
+
+
 @dataclass(frozen=True)
 class Standing:
     """A closed surface (vertices (n, 3) m, outward triangles (m, 3)) and the plane that it stands on, in the
@@ -54,7 +63,7 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
     """Put a surface on its support. up: one of UPS or a direction "X,Y,Z"; sink_m: so much is cut off flat
     at the bottom, for an object that settles or has no flat foot.
 
-    Raises SurfaceError where there is no flat foot.
+    Raises SurfaceError where there is no flat foot, HangingError where a body stands on nothing.
     """
     normal = direction(up)
     vertices, triangles = surface.vertices, surface.triangles
@@ -70,11 +79,12 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
             f"'{surface.name}' has no flat foot to stand on with {up} up: "
             f"{_feet(surface)}{_way(surface, normal)}"
         )
-    hanging = _hanging(vertices, triangles, foot)
+    hanging, of = _hanging(vertices, triangles, foot)
     if hanging > _HANGING:
-        raise SurfaceError(
+        raise HangingError(
             f"'{surface.name}' is of several bodies, and {100 * hanging:.0f} % of their volume touches "
-            f"neither the support nor what stands on it with {up} up: {_way(surface, normal)}"
+            f"neither the support nor what stands on it with {up} up: {_way(surface, normal)}",
+            _names(surface, vertices[np.unique(triangles[of])]),
         )
     nodes = np.unique(triangles[foot])
     if _is_point(vertices, triangles, foot, normal):
@@ -134,7 +144,7 @@ def _way(surface: ClosedSurface, normal: np.ndarray) -> str:
             continue
         foot = _foot(vertices, triangles, normal)
         stands = _share(vertices, triangles, foot) >= 2 * _LEAST_FOOT
-        if stands and _hanging(vertices, triangles, foot) <= _HANGING:
+        if stands and _hanging(vertices, triangles, foot)[0] <= _HANGING:
             return f"cut off what settles, --sink {sink_m:g}"
     return (
         f"cutting off up to {100 * _SINKS[-1]:.0f} % of its height (--sink) does not help; turn it (--up), "
@@ -142,8 +152,15 @@ def _way(surface: ClosedSurface, normal: np.ndarray) -> str:
     )
 
 
-def _hanging(vertices: np.ndarray, triangles: np.ndarray, foot: np.ndarray) -> float:
-    """The share of the volume in bodies that neither stand on a foot (m,) bool nor touch one that does."""
+def _names(surface: ClosedSurface, hanging: np.ndarray) -> tuple[str, ...]:
+    """Of the surface's parts, those all of whose corners are among the hanging ones (k, 3) m."""
+    among, near = cKDTree(hanging), 1e-6 * surface.size_m
+    return tuple(part.name for part in surface.parts if among.query(part.vertices)[0].max() < near)
+
+
+def _hanging(vertices: np.ndarray, triangles: np.ndarray, foot: np.ndarray) -> tuple[float, np.ndarray]:
+    """The share of the volume in bodies that neither stand on a foot (m,) bool nor touch one that does, and
+    which triangles (m,) bool are theirs."""
     import pyvista
 
     count, piece = connected_components(_graph(triangles, len(vertices)), directed=False)
@@ -153,7 +170,7 @@ def _hanging(vertices: np.ndarray, triangles: np.ndarray, foot: np.ndarray) -> f
     left = [k for k in np.unique(owner) if volumes[k] > 0]
     held = [k for k in left if foot[owner == k].any()]
     if len(left) == 1 or not held:
-        return 0.0
+        return 0.0, np.zeros(len(triangles), dtype=bool)
     drawn = {k: pyvista.PolyData.from_regular_faces(vertices, triangles[owner == k]).clean() for k in left}
     left = [k for k in left if k not in held]
     for at in held:  # which grows
@@ -164,7 +181,7 @@ def _hanging(vertices: np.ndarray, triangles: np.ndarray, foot: np.ndarray) -> f
             if inside or drawn[at].collision(drawn[k], contact_mode=1)[1] > 0:
                 held.append(k)
                 left.remove(k)
-    return float(volumes[left].sum() / np.maximum(volumes, 0.0).sum())
+    return float(volumes[left].sum() / np.maximum(volumes, 0.0).sum()), np.isin(owner, left)
 
 
 def _meet(one: np.ndarray, other: np.ndarray) -> bool:

@@ -47,33 +47,46 @@ def neighbours(triangles: np.ndarray) -> np.ndarray:
     return np.where(forward[found] == backward, found // 3, -1).reshape(k, 3)
 
 
+class Closest:
+    """Asks for the closest point of triangles (m, 3) of vertices (n, 3), prepared once."""
+
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray) -> None:
+        import pyvista
+        from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
+
+        self._corners = np.asarray(vertices, dtype=float)[np.asarray(triangles)]
+        shell = pyvista.PolyData.from_regular_faces(np.asarray(vertices, dtype=float), np.asarray(triangles))
+        self._locator = vtkStaticCellLocator()
+        self._locator.SetDataSet(shell)
+        self._locator.BuildLocator()
+
+    def __call__(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `closest`."""
+        from vtkmodules.vtkCommonCore import reference
+        from vtkmodules.vtkCommonDataModel import vtkGenericCell
+
+        # the library's own loop makes anew for every point what serves for all
+        cell, place = vtkGenericCell(), [0.0] * 3
+        triangle, part, squared = (cast(Any, reference(zero)) for zero in (0, 0, 0.0))
+        index, found = np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
+        for k, point in enumerate(np.asarray(points, dtype=float).tolist()):
+            self._locator.FindClosestPoint(point, place, cell, triangle, part, squared)
+            index[k], found[k] = triangle.get(), place
+        a, b, c = np.moveaxis(self._corners[index], 1, 0)
+        u, v, w = b - a, c - a, found - a
+        uu, vv, uv = (np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (v, v), (u, v)))
+        wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
+        area = np.maximum(uu * vv - uv * uv, 1e-300)
+        s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+        weights = np.clip(np.column_stack([1 - s - t, s, t]), 0, 1)
+        return found, index, weights / weights.sum(axis=1, keepdims=True)
+
+
 def closest(
     vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """For points (k, 3): closest points (k, 3), their triangle (k,), and barycentric weights (k, 3) in it."""
-    import pyvista
-    from vtkmodules.vtkCommonCore import reference
-    from vtkmodules.vtkCommonDataModel import vtkGenericCell, vtkStaticCellLocator
-
-    shell = pyvista.PolyData.from_regular_faces(np.asarray(vertices, dtype=float), np.asarray(triangles))
-    locator = vtkStaticCellLocator()
-    locator.SetDataSet(shell)
-    locator.BuildLocator()
-    # the library's own loop makes anew for every point what serves for all
-    cell, place = vtkGenericCell(), [0.0] * 3
-    triangle, part, squared = (cast(Any, reference(zero)) for zero in (0, 0, 0.0))
-    index, found = np.empty(len(points), dtype=np.int64), np.empty((len(points), 3))
-    for k, point in enumerate(np.asarray(points, dtype=float).tolist()):
-        locator.FindClosestPoint(point, place, cell, triangle, part, squared)
-        index[k], found[k] = triangle.get(), place
-    a, b, c = (np.asarray(vertices)[np.asarray(triangles)[index, k]] for k in range(3))
-    u, v, w = b - a, c - a, found - a
-    uu, vv, uv = (np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (v, v), (u, v)))
-    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
-    area = np.maximum(uu * vv - uv * uv, 1e-300)
-    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
-    weights = np.clip(np.column_stack([1 - s - t, s, t]), 0, 1)
-    return found, index, weights / weights.sum(axis=1, keepdims=True)
+    return Closest(vertices, triangles)(points)
 
 
 def distance(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:

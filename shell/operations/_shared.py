@@ -13,7 +13,7 @@ from palpate.mechanics.contact.tip import FORMS
 from palpate.mechanics.disk.surface_files import UNITS, is_surface_file
 from palpate.mechanics.errors import OptionError, PalpateWarning
 from palpate.mechanics.names import number, pairs
-from palpate.mechanics.plausible import EXPLORATION, YOUNG_MODULUS
+from palpate.mechanics.plausible import EXPLORATION, PART_MODULUS, YOUNG_MODULUS
 from palpate.operations._declare import argument, option
 from palpate.operations._to_argparse import finite, natural
 from palpate.render.registry import names, simulator_names
@@ -123,7 +123,7 @@ def _offset(text: str) -> float | str:
 def modulus_option() -> Mapping[str, Any]:
     """--modulus PA, or NAME=PA of each part of a mesh; in Python a number, or {part: Pa, '': of the
     others}."""
-    words = "Young's modulus; of a mesh of several parts NAME=PA (repeatable); None: 20000, of one part"
+    words = "Young's modulus; of a mesh's parts NAME=PA (repeatable; 0: left out); None: 20000, of one part"
     return option(words, unit="Pa", flag="--modulus", metavar="PA", count="repeat", parse=str)
 
 
@@ -141,9 +141,10 @@ def moduli(given: Any) -> Any:
         given = named[""] if set(named) == {""} else named
     for name, value in given.items() if isinstance(given, Mapping) else [("", given)]:
         of = f" of {name}" if name else ""
-        if value is not None and not YOUNG_MODULUS.takes(value):
-            raise OptionError(f"--modulus{of} is {value!r}; it must be {YOUNG_MODULUS.words}")
-        if value is not None and (words := _unlikely(float(value))):
+        allowed = PART_MODULUS if name else YOUNG_MODULUS
+        if value is not None and not allowed.takes(value):
+            raise OptionError(f"--modulus{of} is {value!r}; it must be {allowed.words}")
+        if value and (words := _unlikely(float(value))):
             warnings.warn(f"--modulus{of} is {words}", PalpateWarning, stacklevel=1)
     return given
 

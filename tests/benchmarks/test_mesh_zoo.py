@@ -21,7 +21,7 @@ TEN = (
     "dome, inside out",
     "dome, triangles of no area",
     "dome in inches",
-    "dome with specks",
+    "block and one hanging",
 )
 
 
@@ -43,8 +43,9 @@ def test_what_lies_under_a_place_is_the_object_and_not_the_triangle_that_it_is_i
 
 def test_a_stopped_run_goes_on_where_it_was(tmp_path, monkeypatch):
     arguments = argparse.Namespace(
-        only="two blocks touching", first=60, sizes=1, places=0, solved=0, work=str(tmp_path / "kept.jsonl")
-    )
+        only="two blocks touching", first=60, every=1, sizes=1, places=0, solved=0,
+        work=str(tmp_path / "kept.jsonl"),
+    )  # fmt: skip
     first = run(arguments)
     monkeypatch.setattr(mesh_zoo, "tried", lambda *_: pytest.fail("it was meshed again"))
     assert run(arguments)["shapes"] == first["shapes"]
@@ -64,6 +65,10 @@ def test_there_are_sixty():
         ("'a' is 60 m across: these look like mm: give --unit mm", {"unit": "mm"}),
         ("'a': its flat foot is for --up=0.1,-0.2,1; or turn it", {"up": "0.1,-0.2,1"}),
         ("say --modulus 'body 1=PA', or --modulus PA, one for all", {"young_modulus_pa": 20e3}),
+        (
+            "turn it (--up); or leave out what hangs, --modulus 'body 2=0'",
+            {"young_modulus_pa": {"body 2": 0}},
+        ),
         ("it encloses no volume", None),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.press_solver import equilibrium as settling
-from palpate.mechanics.press_solver.graded_mesh import CurvedSurface, drawn_to, even_surface, graded_mesh
+from palpate.mechanics.press_solver.graded_mesh import CurvedSurface, drawn_to, graded_mesh
 from palpate.mechanics.press_solver.press import PressOptions, PressSolver
 from palpate.mechanics.press_solver.solid import SolidElements
 from palpate.mechanics.shape.tetmesh import box_mesh
@@ -116,22 +116,18 @@ def test_a_coarse_cylinders_felt_surface_is_round_up_to_its_rim():
     turn, z = np.meshgrid(np.linspace(0, 2 * np.pi, 101), half - 1e-3 * np.array([0.5, 1.5, 4, 30]))
     wall = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=-1).reshape(-1, 3)
     cap = wall * [0.97, 0.97, 0] + [0, 0, half]
-    felt = CurvedSurface(*even_surface(shell.vertices, shell.faces))
+    felt = CurvedSurface(shell.vertices, shell.faces)
     assert np.linalg.norm(felt.nearest(np.vstack([wall, cap])) - np.vstack([wall, cap]), axis=1).max() < 2e-5
 
 
-def test_an_even_surface_is_closed_but_for_its_creases():
+def test_a_coarse_balls_felt_surface_is_round_between_its_corners():
+    """Drawn in triangles of at most 3 mm it lay 5 µm off, and of other files 20 µm."""
     import trimesh
 
-    shell = trimesh.creation.box((0.03, 0.02, 0.01))
-    vertices, triangles = even_surface(shell.vertices, shell.faces, 0.004)
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    ends, shared = np.unique(edges, axis=0, return_counts=True)
-    assert shared.max() == 2
-    rim = vertices[ends[shared == 1]]
-    at_rim = np.isclose(np.abs(rim), [0.015, 0.01, 0.005]).sum(axis=-1)
-    assert (at_rim >= 2).all()
-    assert np.linalg.norm(np.diff(vertices[ends], axis=1), axis=2).max() <= 0.004
+    shell = trimesh.creation.icosphere(subdivisions=3, radius=0.03)  # edges of 4.7 mm, 0.09 mm inside
+    points = trimesh.creation.icosphere(subdivisions=5, radius=0.03).vertices
+    felt = CurvedSurface(shell.vertices, shell.faces)
+    assert np.abs(np.linalg.norm(felt.nearest(0.999 * points), axis=1) - 0.03).max() < 3e-6
 
 
 def off_box(points: np.ndarray, half: np.ndarray) -> np.ndarray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import pyvista
@@ -9,7 +11,7 @@ import trimesh
 
 import palpate as pp
 from palpate.mechanics.disk.surface_files import read_surface
-from palpate.scenes.regions import REST, LimitedModulus, moduli_of
+from palpate.scenes.regions import REST, LimitedModulus, left_in, moduli_of
 
 LIVER_PA, TUMOUR_PA = 5e3, 40e3
 
@@ -45,6 +47,53 @@ def test_a_harder_part_than_a_model_holds_is_said(file):
     parts = read_surface(file, "mm").parts
     with pytest.warns(LimitedModulus, match="250000 Pa is taken"):
         assert moduli_of(parts, {REST: LIVER_PA, "tumour": 1e9}, "organ.obj")["tumour"] == 50 * LIVER_PA
+
+
+def hanging(tmp_path, *others):
+    """A block of 60 x 60 x 30 mm on the support, and cubes of 20 mm with their middles at `others`, mm."""
+    bodies = [
+        trimesh.creation.box(extents=(60, 60, 30)),
+        *(trimesh.creation.box(extents=(20,) * 3) for _ in others),
+    ]
+    for body, at in zip(bodies, [(0, 0, 15), *others], strict=True):
+        body.apply_translation(at)
+    path = tmp_path / "hanging.stl"
+    trimesh.util.concatenate(bodies).export(path)
+    return path
+
+
+@pytest.mark.parametrize("given", [None, 5e3, {REST: 5e3}], ids=["no modulus", "one", "one of the rest"])
+def test_a_body_that_hangs_in_the_air_is_left_out_by_the_words_of_the_refusal(tmp_path, given):
+    path = hanging(tmp_path, (60, 0, 60))
+    with pytest.raises(pp.PalpateError, match="leave out what hangs, --modulus '(body .)=0'$") as refused:
+        pp.model_of(path, given, unit="mm", progress=False)
+    name = re.findall("'(body .)=0'", str(refused.value))[0]
+    stated = {**(given if isinstance(given, dict) else {} if given is None else {REST: given}), name: 0.0}
+    made = pp.model_of(path, stated, unit="mm", mesh_size_m=0.015, progress=False)
+    assert made.mesh.volumes.sum() == pytest.approx(60 * 60 * 30e-9, rel=1e-3)
+    assert made.material.young_modulus_pa == (5e3 if given else 20e3)
+    assert f"{name} left out" in made.provenance["mended"]
+
+
+def test_of_more_bodies_those_that_stand_keep_their_moduli(tmp_path):
+    surface = read_surface(hanging(tmp_path, (60, 0, 60), (45, 0, 10)), "mm")
+    gone = next(part.name for part in surface.parts if part.vertices[:, 2].min() > 0.04)
+    left, stated = left_in(surface, {REST: 2e3, gone: 0.0})
+    assert len(left.parts) == 2 and gone not in [part.name for part in left.parts] and stated == {REST: 2e3}
+    with pytest.raises(pp.PalpateError, match="no part is left"):
+        left_in(surface, {part.name: 0.0 for part in surface.parts})
+    with pytest.raises(pp.PalpateError, match="body 1, body 2, body 3"):
+        left_in(surface, {"body 7": 0.0})
+
+
+def test_a_label_beside_another_is_left_out_and_closed_there(tmp_path):
+    grid = pyvista.ImageData(dimensions=(5, 5, 4), spacing=(10, 10, 10)).cast_to_unstructured_grid()
+    grid.cell_data["label"] = np.where(grid.cell_centers().points[:, 0] > 20, 2, 1)
+    grid.save(tmp_path / "halves.vtu")
+    left, stated = left_in(read_surface(tmp_path / "halves.vtu", "mm"), {"label 2": 0.0, "label 1": 3e3})
+    half = trimesh.Trimesh(left.vertices, left.triangles, process=False)
+    assert half.is_watertight and half.volume == pytest.approx(20 * 40 * 30e-9) and stated == 3e3
+    assert half.bounds[1, 0] == pytest.approx(0.02)
 
 
 @pytest.mark.slow
