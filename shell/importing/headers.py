@@ -1,4 +1,5 @@
-"""What the text around a machine's numbers states: the tip, Poisson's ratio, the maker's own modulus."""
+"""What the text around a machine's numbers, or the description beside a recording's samples, states: the tip,
+Poisson's ratio, the maker's own modulus."""
 
 from __future__ import annotations
 
@@ -12,7 +13,11 @@ from palpate.importing.formats.registry import SHEET_SUFFIXES, TEXT_SUFFIXES
 from palpate.importing.formats.sheets import lines_of
 from palpate.importing.formats.text import decoded
 from palpate.importing.units import SI
+from palpate.mechanics.disk.reading import read_toml
+from palpate.mechanics.disk.schema import check_table
+from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import POISSON_RATIO
+from palpate.mechanics.recording.files import SCHEMA, description_of
 
 T = TypeVar("T")
 _HEAD_ROWS, _HEAD_BYTES = 60, 8000
@@ -77,7 +82,16 @@ def alike(values: Sequence[T | None]) -> T | None:
 
 
 def header_of(path: Path) -> Header:
-    """Of a text or a sheet; of other files nothing."""
+    """Of a recording's samples, a text or a sheet; of other files nothing."""
+    described = _description(path)
+    if described is not None:
+        tool = described.get("tool", {})
+        return Header(
+            radius_m=tool.get("tip_radius_m"),
+            form=tool.get("tip"),
+            half_angle_deg=tool.get("tip_angle_deg"),
+            poisson_ratio=described.get("object", {}).get("poisson_ratio"),
+        )
     suffix = path.suffix.lower()
     if suffix in SHEET_SUFFIXES:
         text = "\n".join(line for lines in lines_of(path).values() for line in lines[:_HEAD_ROWS])
@@ -95,6 +109,18 @@ def header_of(path: Path) -> Header:
         poisson_ratio=_poisson(text),
         modulus_pa=_modulus(text),
     )
+
+
+def _description(path: Path) -> dict[str, Any] | None:
+    """What a recording's TOML holds; None of other tables. Raises RecordingError for one that is damaged."""
+    if not path.name.endswith((".csv", ".csv.gz")):
+        return None
+    ((description, _),) = description_of(path)
+    held = read_toml(description, RecordingError) if description.is_file() else {}
+    if "recording" not in held:  # a mapping of an import may lie there too
+        return None
+    check_table(held, SCHEMA, description, RecordingError, strict=False)
+    return held
 
 
 def _says(text: str, words: str) -> bool:

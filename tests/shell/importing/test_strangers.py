@@ -3,10 +3,14 @@ a header's own constants."""
 
 from __future__ import annotations
 
+import json
+import shlex
+
 import numpy as np
 import pytest
 
 import palpate as pp
+from palpate.cli import main
 from palpate.importing.headers import header_of
 from palpate.importing.mapping import Said, find_columns
 from palpate.importing.meaning import Unclear
@@ -215,3 +219,20 @@ def test_a_recording_is_pressed_by_a_sphere_alone(tmp_path):
     np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="t,x,y,z,fx,fy,fz", comments="")
     with pytest.raises(pp.PalpateError, match="--tip is punch"):
         pp.open(tmp_path / "log.csv", tip="punch", tip_radius_m=RADIUS, progress=False)
+
+
+@pytest.mark.parametrize("form", ["punch", "cone"])
+def test_a_recording_by_another_tip_names_the_command_that_knows_all_it_states(tmp_path, capsys, form):
+    path = log(tmp_path / "rec.csv", form)
+    angle = "tip_angle_deg = 45.0\n" * (form == "cone")
+    path.with_suffix(".toml").write_text(
+        '[recording]\nforce_on = "tool"\n[tool]\ntip_radius_m = 0.004\n'
+        f'tip = "{form}"\n{angle}[object]\npoisson_ratio = 0.3\n'
+    )
+    with pytest.raises(pp.PalpateError) as refused:
+        pp.open(path, half_space=True, progress=False)
+    command = str(refused.value).partition("palpate ")[2]
+    assert main([*shlex.split(command), "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    low, high = found["young_modulus_ci95_pa"]
+    assert low <= 12e3 * (1 - 0.3**2) / (1 - 0.49**2) <= high and found["poisson_ratio"] == 0.3
