@@ -17,6 +17,7 @@ from palpate.mechanics.disk.reading import read_toml
 from palpate.mechanics.disk.schema import check_table
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import POISSON_RATIO
+from palpate.mechanics.quantities import parse_unit
 from palpate.mechanics.recording.files import SCHEMA, description_of
 
 T = TypeVar("T")
@@ -37,6 +38,11 @@ _MODULUS = re.compile(
     + _NUMBER + r"\s*([kMG]?Pa)?\b",
     re.IGNORECASE | re.MULTILINE,
 )  # fmt: skip
+_SPRING = re.compile(
+    r"^\W*(?:(?:cantilever|spring)[ -]*(?:spring[ -]*)?(?:constant|stiffness)|k)\s*"
+    r"(?:[\[(]\s*([munp]?N/[mun]?m)\s*[\])])?\s*[:=,;\t ]+\s*" + _NUMBER + r"\s*([munp]?N/[mun]?m)?",
+    re.IGNORECASE | re.MULTILINE,
+)  # fmt: skip
 _TIP = r"(?:probe|tip|indenter|punch|geometry|shape|cantilever)"
 _FORMS = {
     "punch": r"flat[- ]?(?:ended)?[- ]?(?:punch|cylind\w*|tip|probe|indenter)|cylind(?:er|rical)",
@@ -50,13 +56,15 @@ _PASCALS = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "gpa": 1e9}
 
 @dataclass(frozen=True)
 class Header:
-    """What one file's text states; None where it says nothing. modulus_pa: by the maker's software."""
+    """What one file's text states; None where it says nothing. modulus_pa: by the maker's software;
+    spring_n_per_m: of the spring that reads the force."""
 
     radius_m: float | None = None
     form: str | None = None
     half_angle_deg: float | None = None
     poisson_ratio: float | None = None
     modulus_pa: float | None = None
+    spring_n_per_m: float | None = None
 
 
 def of_tables(files: Sequence[Path], said: Mapping[str, Any]) -> dict[str, Any]:
@@ -108,6 +116,7 @@ def header_of(path: Path) -> Header:
         half_angle_deg=_float(angle[1]) if angle else None,
         poisson_ratio=_poisson(text),
         modulus_pa=_modulus(text),
+        spring_n_per_m=_spring(text),
     )
 
 
@@ -156,6 +165,13 @@ def _modulus(text: str) -> float | None:
     found = _MODULUS.search(text)
     unit = (found[1] or found[3] or "").lower() if found else ""
     return _float(found[2]) * _PASCALS[unit] if found and unit else None
+
+
+def _spring(text: str) -> float | None:
+    """N/m; None where none or no unit is said."""
+    found = _SPRING.search(text)
+    unit = (found[1] or found[3]) if found else None
+    return parse_unit(unit).scale * _float(found[2]) if found and unit else None
 
 
 def _float(text: str) -> float:

@@ -62,6 +62,41 @@ def test_a_testing_machines_names_need_no_flag(tmp_path, head):
         pp.open(path, tip_radius_m=RADIUS, progress=False)
 
 
+@pytest.mark.parametrize(
+    "names",
+    [["t (s)", "Piezo displacement (mm)", "Sensor B (N)"], ["t (s)", "Fahrweg [mm]", "Sensor [N]"]],
+)
+def test_the_one_length_and_the_one_force_need_no_known_name(tmp_path, names):
+    path = tmp_path / "a.csv"
+    path.write_text(text([names, *of_numbers(rows())]))
+    assert modulus(path) == pytest.approx(MODULUS, rel=0.02)
+    assert pp.open(path, tip="punch", tip_radius_m=RADIUS, progress=False).kind == "curves"
+
+
+@pytest.mark.parametrize("beside", [1, 2])
+def test_how_far_a_stated_spring_bends_is_a_force(tmp_path, beside):
+    values = rows() / [1, 1, 0.05]  # a spring of 50 N/m, in mm
+    names, path = ["Time (s)", "Piezo (mm)", "Deflection (mm)"] * beside, tmp_path / "a.csv"
+    table = text([names, *of_numbers(np.hstack([values] * beside))])
+    path.write_text(table)
+    said = {"columns": {"depth": "#2", "load": "#3"}}
+    with pytest.raises(pp.PalpateError, match=r"'Spring constant \(N/m\): K' above"):
+        modulus(path, **said)
+    path.write_text("Spring constant (N/m): 50\n" + table)
+    assert modulus(path, **said) == pytest.approx(MODULUS, rel=0.02)
+
+
+def test_a_machines_curve_without_a_known_name_is_told_how_to_name_it(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(text([["Time (s)", "A", "B"], *of_numbers(rows())]))
+    with pytest.raises(pp.PalpateError, match="--column depth=NAME"):
+        pp.open(path, tip="punch", tip_radius_m=RADIUS, progress=False)
+    with pytest.raises(pp.PalpateError, match="--column load=NAME"):
+        modulus(path, columns={"depth": "A"})
+    named = {"columns": {"depth": "A", "load": "B"}, "units": {"position": "mm", "force": "N"}}
+    assert modulus(path, **named) == pytest.approx(MODULUS, rel=0.02)
+
+
 @pytest.mark.parametrize("grouped", [False, True])
 def test_tests_side_by_side_are_all_read(tmp_path, grouped):
     one = rows()[:, [2, 1, 0]] / [G, 1, 1]
@@ -128,6 +163,9 @@ def test_robots_names_are_recognised_beside_what_they_are_not(names):
         ("   EHz=\t500.00 \tkPa", {"modulus_pa": 5e5}),
         ("Young's modulus [kPa]: 12", {"modulus_pa": 12e3}),
         ("Load cell: 50 N\nE: 12", {}),
+        ("Cantilever spring constant (N/m)\t0.27", {"spring_n_per_m": 0.27}),
+        ("k: 46 mN/m", {"spring_n_per_m": 0.046}),
+        ("k: 46\nSpring constant: 3", {}),
         ("Probe: flat-ended cylinder, diameter 10 mm", {"form": "punch"}),
         ("Indenter geometry: conical\nHalf angle: 35", {"form": "cone", "half_angle_deg": 35.0}),
         ("Tip shape = four-sided pyramid", {"form": "pyramid"}),
@@ -139,7 +177,7 @@ def test_a_headers_constants_are_read(tmp_path, words, said):
     path = tmp_path / "a.txt"
     path.write_text(f"Operator: x\n{words}\nt;z;f\n1;2;3\n")
     held = header_of(path)
-    for name in ("poisson_ratio", "modulus_pa", "form", "half_angle_deg"):
+    for name in ("poisson_ratio", "modulus_pa", "form", "half_angle_deg", "spring_n_per_m"):
         wanted = said.get(name)
         assert getattr(held, name) == (pytest.approx(wanted) if isinstance(wanted, float) else wanted), name
 
