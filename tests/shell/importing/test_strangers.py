@@ -97,6 +97,22 @@ def test_a_machines_curve_without_a_known_name_is_told_how_to_name_it(tmp_path):
     assert modulus(path, **named) == pytest.approx(MODULUS, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("name", "held", "cure"),
+    [
+        ("part.step", b"ISO-10303-21;", "csv, its shape as stl"),
+        ("curve.jpk-force", b"PK", "Export its numbers as csv"),
+        ("old.xls", b"\xd0\xcf\x11\xe0", "write it anew, as csv"),
+        ("old.bag", b"#ROSBAG V1.2\n", "write it anew, as csv"),
+        ("cut.msh", b"foo", "write it anew, as stl"),
+    ],
+)
+def test_a_kind_that_is_not_read_is_told_as_what_to_export_it(tmp_path, name, held, cure):
+    (tmp_path / name).write_bytes(held)
+    with pytest.raises(pp.PalpateError, match=f"'.*{name}'.*{cure}"):
+        pp.open(tmp_path / name, unit="mm", young_modulus_pa=5e3, progress=False)
+
+
 @pytest.mark.parametrize("grouped", [False, True])
 def test_tests_side_by_side_are_all_read(tmp_path, grouped):
     one = rows()[:, [2, 1, 0]] / [G, 1, 1]
