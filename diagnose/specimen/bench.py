@@ -41,6 +41,8 @@ _BASELINE = 0.1
 _LEAST_NOISE = 1e-3
 _STRAIGHT = 0.1
 """Share of the peak from which a root of the force is straight."""
+_LINE, _FREE = 4, 3
+"""Readings that a line of a way in of its own needs, and readings beyond unknowns of lines of one slope."""
 _CONTACT = 8.0
 """A curve must rise above so many standard deviations of its noise."""
 UP = np.array([0.0, 0.0, 1.0])
@@ -141,7 +143,7 @@ def touched(curves: Sequence[MachineCycle], tip: Tip) -> Touched:
         assert tip.radius_m is not None
         onset, error = _first_touches(loadings, HAND_TIP_M / tip.radius_m, noise)
     else:
-        onset, error = np.array([_touch_of_power(each, tip.power) for each in loadings]).T
+        onset, error = _touches_of_power(loadings, tip.power, noise)
     return Touched([c for c, _ in kept], used, loadings, noise, onset, error)
 
 
@@ -156,15 +158,43 @@ def _first_touches(loadings: Sequence[Loading], length: float, noise: float) -> 
     return onset / length, error / length
 
 
-def _touch_of_power(each: Loading, power: float) -> tuple[float, float]:
-    """(m, its standard error) of one way in whose force grows by that power of the depth: the root of the
-    force is straight, and its zero is the touch."""
-    over = each.push > _STRAIGHT * each.push.max()
-    if over.sum() < 4:
-        raise _too_few([each])
-    root = each.push[over] ** (1 / power)
-    (slope, at_zero), covariance = np.polyfit(root, each.u[over], 1, cov=True)
-    return float(at_zero), float(np.sqrt(covariance[1, 1]))
+def _touches_of_power(
+    loadings: Sequence[Loading], power: float, noise: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """m, and their standard errors, of ways in whose force grows by that power of the depth: the root of the
+    force is straight, and its zero is the touch. A way in of too few rows for a line of its own takes the
+    slope that all share, as those into one piece do."""
+    rows = [each.push > _STRAIGHT * each.push.max() for each in loadings]
+    lines = [
+        (each.u[over], each.push[over] ** (1 / power)) for each, over in zip(loadings, rows, strict=True)
+    ]
+    counts = np.array([len(u) for u, _ in lines])
+    onset, error = np.empty(len(lines)), np.empty(len(lines))
+    if counts.min() < _LINE:
+        onset, error = _touches_of_one_slope(loadings, lines, noise / power)
+    for k in np.flatnonzero(counts >= _LINE):
+        u, root = lines[k]
+        (_, onset[k]), covariance = np.polyfit(root, u, 1, cov=True)
+        error[k] = np.sqrt(covariance[1, 1])
+    return onset, error
+
+
+def _touches_of_one_slope(
+    loadings: Sequence[Loading], lines: Sequence[tuple[np.ndarray, np.ndarray]], noise: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """m, and their standard errors, of lines (travel m, root of the force) of one slope. noise: N, over the
+    power."""
+    counts = np.array([len(u) for u, _ in lines])
+    free = int(counts.sum()) - len(lines) - 1
+    if free < _FREE:
+        raise _too_few(loadings)
+    u, root = (np.array([v.mean() for v in values]) for values in zip(*lines, strict=True))
+    off, apart = (np.concatenate([v - v.mean() for v in values]) for values in zip(*lines, strict=True))
+    width = float(apart @ apart)
+    slope = float(apart @ off) / width
+    by_noise = slope * max(r.max() for _, r in lines) * noise / max(each.push.max() for each in loadings)
+    by_line = float(np.sqrt(((off - slope * apart) ** 2).sum() / free))
+    return u - slope * root, max(by_line, by_noise) * np.sqrt(1 / counts + root**2 / width)
 
 
 def _too_few(loadings: Sequence[Loading]) -> ContactError:

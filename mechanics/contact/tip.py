@@ -27,16 +27,23 @@ _OF_TANGENT = {"cone": 2 / np.pi, "pyramid": 0.7453}
 
 
 def other_tip(
-    form: str, where: str, file: str = "FILE", radius_m: float | None = None, *, own: bool = False
+    form: str,
+    where: str,
+    file: str = "FILE",
+    radius_m: float | None = None,
+    angle_deg: float | None = None,
+    *,
+    own: bool = False,
 ) -> str:
     """Why presses of an object by a tip of another form are refused, and the command that reads them.
-    radius_m: where it is known; own: the file is a recording, whose columns have names of their own."""
-    size = "--tip-angle DEGREES" if form in POINTED else f"--tip-radius {radius_m or 'M'}"
-    columns = " --column t=t --column depth=-z --column load=fz" if own else ""
+    radius_m, angle_deg: where known; own: the file is a recording, whose columns have names and units of
+    their own."""
+    size = f"--tip-angle {angle_deg or 'DEGREES'}" if form in POINTED else f"--tip-radius {radius_m or 'M'}"
+    said = " --column t=t --column depth=-z --column load=fz --units position=m,force=N" if own else ""
     return (
         f"{where} is {form}, and shapes, models and their forces are of a sphere alone, under whose laws "
         f"{WORDS[form]} gives a wrong modulus. Straight presses of one flat piece are read as a machine's "
-        f"curves: palpate material {file} --tip {form} {size}{columns}"
+        f"curves: palpate material {file} --tip {form} {size}{said}"
     )
 
 

@@ -191,7 +191,10 @@ def _shell_of(path: Path, metres: float) -> tuple[trimesh.Trimesh, tuple[Part, .
         ) from error
     except (SystemExit, Exception) as error:  # each library has errors of its own for a damaged file
         reason = "it is damaged" if isinstance(error, SystemExit) else " ".join(str(error).split())[:200]
-        raise SurfaceError(f"'{path}' cannot be read as {suffix.removeprefix('.')} ({reason})") from error
+        raise SurfaceError(
+            f"'{path}' cannot be read as {suffix.removeprefix('.')} ({reason}): write it anew, as stl where "
+            "that fails"
+        ) from error
 
 
 def _within(folder: Path) -> Any:

@@ -204,7 +204,12 @@ def read_recording(path: Path | str) -> Recording:
     if tool.get("tip", "sphere") != "sphere":
         raise RecordingError(
             other_tip(
-                tool["tip"], f"'{description}': [tool] tip", str(samples), tool.get("tip_radius_m"), own=True
+                tool["tip"],
+                f"'{description}': [tool] tip",
+                str(samples),
+                tool.get("tip_radius_m"),
+                tool.get("tip_angle_deg"),
+                own=True,
             )
         )
     for name, part, key in (("recording", about, "force_on"), ("tool", tool, "tip_radius_m")):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ from palpate.importing.curve_meaning import (
     signs_of,
     unclear_signs,
 )
+from palpate.importing.headers import header_of
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import (
     MOST_ODDS,
@@ -33,7 +34,7 @@ from palpate.importing.meaning import (
 )
 from palpate.importing.side_by_side import side_by_side
 from palpate.importing.tables import Table, read_tables
-from palpate.importing.units import SI, without_unit
+from palpate.importing.units import SI, unit_in, without_unit
 from palpate.mechanics.bounds import LARGEST_N
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import EXPLORATION
@@ -105,20 +106,28 @@ def _raws(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -
     tables = read_tables(path)
     if not said.columns and tuple(tables[0].columns) == PRESS_COLUMNS:
         return [_of_press(path, tables[0], notes)]
+    spring = header_of(path).spring_n_per_m
     tests = [side_by_side(table) for table in tables]
     several = max(tests, key=len)
     if len(several) < 2:
-        return [_raw(path, tables, said, notes, odds)]
+        return [_raw(path, tables, said, spring, notes, odds)]
     notes.append(f"'{path.name}' holds {len(several)} tests side by side")
-    return [_raw(path.with_name(test.name), [test], said, notes, odds) for test in several]
+    return [_raw(path.with_name(test.name), [test], said, spring, notes, odds) for test in several]
 
 
 def _raw(
-    path: Path, tables: list[Table], said: SaidOfCurves, notes: list[str], odds: list[float]
+    path: Path,
+    tables: list[Table],
+    said: SaidOfCurves,
+    spring: float | None,
+    notes: list[str],
+    odds: list[float],
 ) -> RawCurves:
+    """spring: N/m, of the one that reads the force, where the file states it."""
     found = find_columns(tables, Said(columns=said.columns, units=said.units))
     of_curves: tuple[str, ...] = ("t", "z", "fz")
     columns = {role: found[role] for role in of_curves if role in found}
+    columns["fz"] = _force_of(path, columns["fz"], spring)
     z, push = (np.asarray(columns[role].values, float) for role in ("z", "fz"))
     t = np.asarray(columns["t"].values, float) if "t" in columns else np.arange(z.size) / _UNTIMED_HZ
     if t.ndim == 0 or z.ndim == 0 or push.ndim == 0 or len({len(t), len(z), len(push)}) > 1:
@@ -140,6 +149,22 @@ def _raw(
     if fresh.sum() < LEAST_ROWS:
         raise RecordingError(f"'{path}' has {fresh.sum()} rows in order of time: {LEAST_ROWS} are needed")
     return RawCurves(path, t[fresh], z[fresh], push[fresh], columns)
+
+
+def _force_of(path: Path, column: Column, spring: float | None) -> Column:
+    """A column of force, in N of the spring where it is how far that bends. Raises RecordingError where no
+    file states the spring."""
+    length = unit_in(column.name, "position")
+    if length is None:
+        return column
+    if spring is None:
+        raise RecordingError(
+            f"'{path}': '{column.name}' is a length, as of a spring that bends, and the file does not state "
+            "the spring: write a line 'Spring constant (N/m): K' above the columns' names, or name a column "
+            "of force by --column load=NAME"
+        )
+    factor = float(np.sign(column.factor)) * SI["position"][length] * spring
+    return replace(column, factor=factor, unit="N", assumed=False)
 
 
 def _of_press(path: Path, table: Table, notes: list[str]) -> RawCurves:

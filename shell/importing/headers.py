@@ -1,4 +1,5 @@
-"""What the text around a machine's numbers states: the tip, Poisson's ratio, the maker's own modulus."""
+"""What the text around a machine's numbers, or the description beside a recording's samples, states: the tip,
+Poisson's ratio, the maker's own modulus."""
 
 from __future__ import annotations
 
@@ -12,7 +13,12 @@ from palpate.importing.formats.registry import SHEET_SUFFIXES, TEXT_SUFFIXES
 from palpate.importing.formats.sheets import lines_of
 from palpate.importing.formats.text import decoded
 from palpate.importing.units import SI
+from palpate.mechanics.disk.reading import read_toml
+from palpate.mechanics.disk.schema import check_table
+from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import POISSON_RATIO
+from palpate.mechanics.quantities import parse_unit
+from palpate.mechanics.recording.files import SCHEMA, description_of
 
 T = TypeVar("T")
 _HEAD_ROWS, _HEAD_BYTES = 60, 8000
@@ -32,6 +38,11 @@ _MODULUS = re.compile(
     + _NUMBER + r"\s*([kMG]?Pa)?\b",
     re.IGNORECASE | re.MULTILINE,
 )  # fmt: skip
+_SPRING = re.compile(
+    r"^\W*(?:(?:cantilever|spring)[ -]*(?:spring[ -]*)?(?:constant|stiffness)|k)\s*"
+    r"(?:[\[(]\s*([munp]?N/[mun]?m)\s*[\])])?\s*[:=,;\t ]+\s*" + _NUMBER + r"\s*([munp]?N/[mun]?m)?",
+    re.IGNORECASE | re.MULTILINE,
+)  # fmt: skip
 _TIP = r"(?:probe|tip|indenter|punch|geometry|shape|cantilever)"
 _FORMS = {
     "punch": r"flat[- ]?(?:ended)?[- ]?(?:punch|cylind\w*|tip|probe|indenter)|cylind(?:er|rical)",
@@ -45,13 +56,15 @@ _PASCALS = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "gpa": 1e9}
 
 @dataclass(frozen=True)
 class Header:
-    """What one file's text states; None where it says nothing. modulus_pa: by the maker's software."""
+    """What one file's text states; None where it says nothing. modulus_pa: by the maker's software;
+    spring_n_per_m: of the spring that reads the force."""
 
     radius_m: float | None = None
     form: str | None = None
     half_angle_deg: float | None = None
     poisson_ratio: float | None = None
     modulus_pa: float | None = None
+    spring_n_per_m: float | None = None
 
 
 def of_tables(files: Sequence[Path], said: Mapping[str, Any]) -> dict[str, Any]:
@@ -77,7 +90,16 @@ def alike(values: Sequence[T | None]) -> T | None:
 
 
 def header_of(path: Path) -> Header:
-    """Of a text or a sheet; of other files nothing."""
+    """Of a recording's samples, a text or a sheet; of other files nothing."""
+    described = _description(path)
+    if described is not None:
+        tool = described.get("tool", {})
+        return Header(
+            radius_m=tool.get("tip_radius_m"),
+            form=tool.get("tip"),
+            half_angle_deg=tool.get("tip_angle_deg"),
+            poisson_ratio=described.get("object", {}).get("poisson_ratio"),
+        )
     suffix = path.suffix.lower()
     if suffix in SHEET_SUFFIXES:
         text = "\n".join(line for lines in lines_of(path).values() for line in lines[:_HEAD_ROWS])
@@ -94,7 +116,20 @@ def header_of(path: Path) -> Header:
         half_angle_deg=_float(angle[1]) if angle else None,
         poisson_ratio=_poisson(text),
         modulus_pa=_modulus(text),
+        spring_n_per_m=_spring(text),
     )
+
+
+def _description(path: Path) -> dict[str, Any] | None:
+    """What a recording's TOML holds; None of other tables. Raises RecordingError for one that is damaged."""
+    if not path.name.endswith((".csv", ".csv.gz")):
+        return None
+    ((description, _),) = description_of(path)
+    held = read_toml(description, RecordingError) if description.is_file() else {}
+    if "recording" not in held:  # a mapping of an import may lie there too
+        return None
+    check_table(held, SCHEMA, description, RecordingError, strict=False)
+    return held
 
 
 def _says(text: str, words: str) -> bool:
@@ -130,6 +165,13 @@ def _modulus(text: str) -> float | None:
     found = _MODULUS.search(text)
     unit = (found[1] or found[3] or "").lower() if found else ""
     return _float(found[2]) * _PASCALS[unit] if found and unit else None
+
+
+def _spring(text: str) -> float | None:
+    """N/m; None where none or no unit is said."""
+    found = _SPRING.search(text)
+    unit = (found[1] or found[3]) if found else None
+    return parse_unit(unit).scale * _float(found[2]) if found and unit else None
 
 
 def _float(text: str) -> float:

@@ -139,6 +139,9 @@ def _indentations(paths: list[Path], said_tip: SaidOfTip, said: SaidOfCurves) ->
         form = "sphere"
         odds.append(sphere_or_ask(curves, said_tip.radius_m, poisson))
     moduli = [h.modulus_pa for h in heads if h.modulus_pa is not None]
+    spring = alike([h.spring_n_per_m for h in heads])
+    if spring is not None:
+        notes.append(f"the file states a spring of {spring:g} N/m that reads the force")
     return MachineTests(
         "indentation",
         curves=tuple(curves),

@@ -188,10 +188,11 @@ def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
     for kind, roles in (("position", "xyz"), ("force", ("fx", "fy", "fz"))):
         missing = [role for role in roles if role not in found]
         if missing:
+            of_curve = "depth" if kind == "position" else "load"
+            alone = f", or of a machine's curve --column {of_curve}=NAME" * (len(missing) == len(roles))
             raise RecordingError(
                 f"which columns are {kind} ({', '.join(missing)}) cannot be determined from their names; "
-                f"give it "
-                f"with --column {missing[0]}=NAME (or '#3', '=0'): there are {_listed(tables)}"
+                f"give it with --column {missing[0]}=NAME (or '#3', '=0'){alone}: there are {_listed(tables)}"
             )
     if any(q in found for q in ROLES[7:]) and not all(q in found for q in ROLES[7:]):
         found = {role: column for role, column in found.items() if not role.startswith("q")}
@@ -301,20 +302,26 @@ def _complete(tables: Sequence[Table], said: Said, found: dict[str, Column]) -> 
         _key(name[_shared_prefix(table) :]) in ("x", "y") for table in tables for name in table.columns
     )
     if not sideways and not any(role in found for role in "xyz"):
-        along = named_first(tables, "travel")
+        along = named_first(tables, "travel") or _only_of(tables, "position")
         if along is not None:
             # travel counts into the sample, z out of it
             bare = _key(along[1][_shared_prefix(along[0]) :])
             sign = 1.0 if bare in vocabulary()["travel"]["out"] else -1.0
             found["z"] = _column("z", *along, said, sign=sign, guessed=True)
     if not any(role in found for role in ("fx", "fy", "fz")):
-        push = named_first(tables, "load")
+        push = named_first(tables, "load") or _only_of(tables, "force")
         if push is not None:
             found["fz"] = _column("fz", *push, said, guessed=True)
     for axes in (("x", "y", "z"), ("fx", "fy", "fz")):
         there = [axis for axis in axes if axis in found]
         if len(there) == 1 and there[0][-1] == "z":
             found.update({axis: Column(axis, None, "", 0.0, "", True) for axis in axes[:2]})
+
+
+def _only_of(tables: Sequence[Table], kind: str) -> tuple[Table, str] | None:
+    """The one column whose unit is of a kind, whatever it is called."""
+    own = [(table, n) for table in tables for n in table.columns if unit_in(n, kind) is not None]
+    return own[0] if len(own) == 1 else None
 
 
 def named_first(tables: Sequence[Table], what: str) -> tuple[Table, str] | None:

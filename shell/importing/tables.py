@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate.importing.formats.registry import by_suffix
 from palpate.mechanics.disk.reading import bounded_memory, no_file
+from palpate.mechanics.disk.surface_files import SUFFIXES
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.extras import install_words
 
@@ -42,9 +43,10 @@ def read_tables(path: Path | str) -> list[Table]:
         raise RecordingError(f"'{path}' {no_file(path)}: name a file that is there")
     suffix, known = ".bag" if path.is_dir() else path.suffix.lower(), by_suffix()
     if suffix not in known:
-        allowed = ", ".join(s.removeprefix(".") for s in known)
+        allowed, shapes = (", ".join(s.removeprefix(".") for s in each) for each in (known, SUFFIXES))
         raise RecordingError(
-            f"'{path}' is of no kind that can be read: allowed are {allowed}, a ROS 2 bag's folder"
+            f"'{path}' is of no kind that can be read: allowed are {allowed}, a ROS 2 bag's folder; of "
+            f"shapes {shapes}. Export its numbers as csv, its shape as stl"
         )
     module, _, needs = known[suffix]
     reader: Callable[[Path], list[Table]] = import_module(module).read
@@ -60,7 +62,10 @@ def read_tables(path: Path | str) -> list[Table]:
         ) from error
     except Exception as error:  # each library has errors of its own for a damaged file
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise RecordingError(f"'{path}' cannot be read as {suffix.removeprefix('.')} ({reason})") from error
+        raise RecordingError(
+            f"'{path}' cannot be read as {suffix.removeprefix('.')} ({reason}): write it anew, as csv "
+            "where that fails"
+        ) from error
     if not tables:
         raise RecordingError(f"'{path}' holds no columns of numbers with two rows or more")
     return tables

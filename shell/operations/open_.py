@@ -193,15 +193,14 @@ def _known(how: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _as_table(file: Any) -> tuple[tuple[Path], dict[str, Any]]:
-    """A recording's samples, and what its description states of them."""
+    """A recording's samples, and what its description states of their force."""
     from palpate.mechanics.disk.reading import read_toml
     from palpate.mechanics.errors import RecordingError
     from palpate.mechanics.recording.files import recording_files
 
     samples, description = recording_files(file)
     held = read_toml(description, RecordingError)
-    tool, about = held.get("tool", {}), held.get("recording", {})
-    return (samples,), {"tip_radius_m": tool.get("tip_radius_m"), "force_on": about.get("force_on")}
+    return (samples,), {"force_on": held.get("recording", {}).get("force_on")}
 
 
 def _table(
@@ -259,7 +258,7 @@ def _sphere_alone(
     """Raise OptionError for a tip that recordings, surfaces and models know nothing of."""
     form = tip or ("sphere" if angle_deg is None else "cone")
     if form != "sphere":
-        raise OptionError(other_tip(form, "--tip", str(file), radius_m, own=own))
+        raise OptionError(other_tip(form, "--tip", str(file), radius_m, angle_deg, own=own))
 
 
 def _only(files: tuple[Any, ...]) -> Any:

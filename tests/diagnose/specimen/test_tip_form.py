@@ -95,6 +95,20 @@ def test_three_readings_in_contact_are_too_few_and_what_to_do_is_said():
         material(TIPS["cone"], [few])
 
 
+@pytest.mark.parametrize("form", ["punch", "cone"])
+def test_ways_in_of_two_or_three_readings_share_their_modulus(form):
+    """Each press is read in steps of 0.9 mm of its 2.5, which begin anywhere."""
+    tip, rng, few = TIPS[form], np.random.default_rng(5), []
+    for k in range(6):
+        dent = 2.5e-3 - 0.9e-3 * np.abs(np.arange(-12, 13) + k / 6 - 0.4)
+        force = tip.force(tip.laws[0], dent, MODULUS, NU)
+        read = force + 0.002 * force.max() * rng.standard_normal(len(force))
+        few.append(MachineCycle(np.arange(len(dent)) / 10, dent, read))
+    made = material(tip, few)
+    low, high = made.young_modulus_ci95_pa
+    assert made.predicts and made.curves == 6 and low <= MODULUS <= high < 1.5 * low
+
+
 def test_poissons_ratio_is_the_files_where_nobody_states_another():
     given = tuple(curves(TIPS["sphere"]))
     tests = MachineTests("indentation", curves=given, tip=TIPS["sphere"], poisson_ratio=0.3)

@@ -3,10 +3,14 @@ a header's own constants."""
 
 from __future__ import annotations
 
+import json
+import shlex
+
 import numpy as np
 import pytest
 
 import palpate as pp
+from palpate.cli import main
 from palpate.importing.headers import header_of
 from palpate.importing.mapping import Said, find_columns
 from palpate.importing.meaning import Unclear
@@ -56,6 +60,57 @@ def test_a_testing_machines_names_need_no_flag(tmp_path, head):
     assert pp.open(path, tip="punch", tip_radius_m=RADIUS, progress=False).kind == "curves"
     with pytest.raises(Unclear, match="--tip punch"):
         pp.open(path, tip_radius_m=RADIUS, progress=False)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [["t (s)", "Piezo displacement (mm)", "Sensor B (N)"], ["t (s)", "Fahrweg [mm]", "Sensor [N]"]],
+)
+def test_the_one_length_and_the_one_force_need_no_known_name(tmp_path, names):
+    path = tmp_path / "a.csv"
+    path.write_text(text([names, *of_numbers(rows())]))
+    assert modulus(path) == pytest.approx(MODULUS, rel=0.02)
+    assert pp.open(path, tip="punch", tip_radius_m=RADIUS, progress=False).kind == "curves"
+
+
+@pytest.mark.parametrize("beside", [1, 2])
+def test_how_far_a_stated_spring_bends_is_a_force(tmp_path, beside):
+    values = rows() / [1, 1, 0.05]  # a spring of 50 N/m, in mm
+    names, path = ["Time (s)", "Piezo (mm)", "Deflection (mm)"] * beside, tmp_path / "a.csv"
+    table = text([names, *of_numbers(np.hstack([values] * beside))])
+    path.write_text(table)
+    said = {"columns": {"depth": "#2", "load": "#3"}}
+    with pytest.raises(pp.PalpateError, match=r"'Spring constant \(N/m\): K' above"):
+        modulus(path, **said)
+    path.write_text("Spring constant (N/m): 50\n" + table)
+    assert modulus(path, **said) == pytest.approx(MODULUS, rel=0.02)
+
+
+def test_a_machines_curve_without_a_known_name_is_told_how_to_name_it(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text(text([["Time (s)", "A", "B"], *of_numbers(rows())]))
+    with pytest.raises(pp.PalpateError, match="--column depth=NAME"):
+        pp.open(path, tip="punch", tip_radius_m=RADIUS, progress=False)
+    with pytest.raises(pp.PalpateError, match="--column load=NAME"):
+        modulus(path, columns={"depth": "A"})
+    named = {"columns": {"depth": "A", "load": "B"}, "units": {"position": "mm", "force": "N"}}
+    assert modulus(path, **named) == pytest.approx(MODULUS, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "cure"),
+    [
+        ("part.step", b"ISO-10303-21;", "csv, its shape as stl"),
+        ("curve.jpk-force", b"PK", "Export its numbers as csv"),
+        ("old.xls", b"\xd0\xcf\x11\xe0", "write it anew, as csv"),
+        ("old.bag", b"#ROSBAG V1.2\n", "write it anew, as csv"),
+        ("cut.msh", b"foo", "write it anew, as stl"),
+    ],
+)
+def test_a_kind_that_is_not_read_is_told_as_what_to_export_it(tmp_path, name, held, cure):
+    (tmp_path / name).write_bytes(held)
+    with pytest.raises(pp.PalpateError, match=f"'.*{name}'.*{cure}"):
+        pp.open(tmp_path / name, unit="mm", young_modulus_pa=5e3, progress=False)
 
 
 @pytest.mark.parametrize("grouped", [False, True])
@@ -124,6 +179,9 @@ def test_robots_names_are_recognised_beside_what_they_are_not(names):
         ("   EHz=\t500.00 \tkPa", {"modulus_pa": 5e5}),
         ("Young's modulus [kPa]: 12", {"modulus_pa": 12e3}),
         ("Load cell: 50 N\nE: 12", {}),
+        ("Cantilever spring constant (N/m)\t0.27", {"spring_n_per_m": 0.27}),
+        ("k: 46 mN/m", {"spring_n_per_m": 0.046}),
+        ("k: 46\nSpring constant: 3", {}),
         ("Probe: flat-ended cylinder, diameter 10 mm", {"form": "punch"}),
         ("Indenter geometry: conical\nHalf angle: 35", {"form": "cone", "half_angle_deg": 35.0}),
         ("Tip shape = four-sided pyramid", {"form": "pyramid"}),
@@ -135,7 +193,7 @@ def test_a_headers_constants_are_read(tmp_path, words, said):
     path = tmp_path / "a.txt"
     path.write_text(f"Operator: x\n{words}\nt;z;f\n1;2;3\n")
     held = header_of(path)
-    for name in ("poisson_ratio", "modulus_pa", "form", "half_angle_deg"):
+    for name in ("poisson_ratio", "modulus_pa", "form", "half_angle_deg", "spring_n_per_m"):
         wanted = said.get(name)
         assert getattr(held, name) == (pytest.approx(wanted) if isinstance(wanted, float) else wanted), name
 
@@ -215,3 +273,20 @@ def test_a_recording_is_pressed_by_a_sphere_alone(tmp_path):
     np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="t,x,y,z,fx,fy,fz", comments="")
     with pytest.raises(pp.PalpateError, match="--tip is punch"):
         pp.open(tmp_path / "log.csv", tip="punch", tip_radius_m=RADIUS, progress=False)
+
+
+@pytest.mark.parametrize("form", ["punch", "cone"])
+def test_a_recording_by_another_tip_names_the_command_that_knows_all_it_states(tmp_path, capsys, form):
+    path = log(tmp_path / "rec.csv", form)
+    angle = "tip_angle_deg = 45.0\n" * (form == "cone")
+    path.with_suffix(".toml").write_text(
+        '[recording]\nforce_on = "tool"\n[tool]\ntip_radius_m = 0.004\n'
+        f'tip = "{form}"\n{angle}[object]\npoisson_ratio = 0.3\n'
+    )
+    with pytest.raises(pp.PalpateError) as refused:
+        pp.open(path, half_space=True, progress=False)
+    command = str(refused.value).partition("palpate ")[2]
+    assert main([*shlex.split(command), "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    low, high = found["young_modulus_ci95_pa"]
+    assert low <= 12e3 * (1 - 0.3**2) / (1 - 0.49**2) <= high and found["poisson_ratio"] == 0.3

@@ -186,3 +186,21 @@ def test_a_sound_mesh_has_its_volume(opened, name, unit, volume_cm3):
 def test_a_block_that_crosses_itself_is_refused(opened):
     with pytest.raises(SurfaceError, match="crosses itself"):
         opened("twisted_block_mm.obj", unit="mm", young_modulus_pa=4e3)
+
+
+@pytest.mark.slow
+def test_a_simulators_frame_unit_and_force_law_are_told_before_its_numerics(shared_recordings, reconstructed):
+    """Our own forces along a labelled recording, right but for that."""
+    recording = pp.read_recording(shared_recordings / "silicone-1-cylinder.toml")
+    model = reconstructed("silicone-1-cylinder")
+    right = pp.replay(model, recording, progress=False)
+    size = np.linalg.norm(right.force_n, axis=1, keepdims=True)
+    usual = np.percentile(size[size > 0.05], 95)
+    for force, axes, unit, effects in (
+        (right.force_n[:, [0, 2, 1]] * [1, 1, -1], "x,z,-y", "N", ()),
+        (1e3 * right.force_n, "x,y,z", "mN", ()),
+        (right.force_n * (size / usual) ** (1 / 3), "x,y,z", "N", ("force_law",)),
+    ):
+        found = pp.diagnose(recording, model, fast=True, simulated=(right.t, force), progress=False)
+        assert found.effects == effects
+        assert (found.simulator.axes, found.simulator.unit) == (axes, unit)
