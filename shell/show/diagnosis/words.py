@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.diagnosis.verdict.result import Diagnosis, NextTouch
 from palpate.mechanics.effects.base import Scope
 from palpate.mechanics.effects.registry import effect
 from palpate.show.diagnosis.gaps import depth_contrast, in_model, press_gaps, worst_press
@@ -238,11 +238,17 @@ def short_verdict(kind: str, effects: Sequence[str], candidates: Sequence[str]) 
     return listed(said) or kind
 
 
+def touch_parts(touch: NextTouch) -> str:
+    """'A from B': what the next touch separates, of candidates or, where nothing known explains the gap, of
+    what comes nearest to it."""
+    return " from ".join(map(spaced, touch.separates))
+
+
 def touch_words(result: Diagnosis) -> str:
     """Where and how to touch next, and what that would tell."""
     touch = result.next_touch
     assert touch is not None
-    parted = " from ".join(map(spaced, touch.separates))
+    parted = touch_parts(touch)
     if touch.kind != "press":
         return f"to separate {parted}: {touch.why}"
     direction = ", ".join(f"{round(d, 2) + 0.0:g}" for d in touch.direction)
