@@ -59,7 +59,7 @@ def _moduli(result: Changes) -> say.Story:
         named = f"; {verdict(side.diagnosis)}" if side.diagnosis is not None else ""
         yield say.TextLine(f"{words}, {side.recording.name}: {kpa(side.modulus_pa)} ({interval}){named}")
     low, high = result.difference_ci95_pa
-    interval = sure(f"{low / 1e3:+.2f}", f"{high / 1e3:+.2f}")
+    interval = sure(kpa(low, "+.2f"), kpa(high, "+.2f"))
     yield say.TextLine(f"difference {kpa(result.difference_pa, '+.2f')} ({interval})")
 
 

@@ -14,6 +14,7 @@ import pytest
 from palpate.mechanics.effects.registry import NAMES
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.show import story as say
+from palpate.show.changes import _moduli
 from palpate.show.comparison.figures import press_curves
 from palpate.show.diagnosis.story import next_steps
 from palpate.show.diagnosis.words import limits, verdict, where
@@ -285,3 +286,19 @@ def test_a_first_screen_tells_few_limits_and_a_terminal_all():
     few = limits(result, 3)
     assert few.count(" from ") == 4 and "15 others" in few and "effect 18 from 19 mN" in few
     assert limits(SimpleNamespace(entries=entries[:4]), 3).count(" from ") == 4
+
+
+def test_a_small_difference_has_its_unit_at_both_ends_of_its_interval():
+    """ "Difference -4.3 Pa (95 % sure: -1.63 to +1.62)": its ends were kilopascals."""
+    material = SimpleNamespace(young_modulus_ci95_pa=(27e3, 30e3))
+    side = SimpleNamespace(
+        recording=SimpleNamespace(name="one"),
+        modulus_pa=28e3,
+        model=SimpleNamespace(material=material),
+        diagnosis=None,
+    )
+    result = SimpleNamespace(
+        before=side, after=side, difference_pa=-4.3, difference_ci95_pa=(-1630.0, 1620.0)
+    )
+    *_, last = _moduli(result)
+    assert "-4.3 Pa" in last.text and "-1.63 kPa to +1.62 kPa" in last.text
