@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from palpate.diagnosis.compare.before_after import Changes
 from palpate.mechanics.effects.registry import NAMES
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
 from palpate.show import story as say
@@ -223,6 +224,15 @@ def test_a_headline_has_at_most_twenty_words_and_no_flag_and_the_page_says_the_r
     assert ended(first) in re.findall(r'<p class="lead">(.*?)</p>', re.sub(r"<(?!/?p)[^>]*>", "", said))
 
 
+def test_what_follows_a_headline_is_no_bracket():
+    """ "(95 % sure: -5 to +6 %)." stood by itself."""
+    text = (
+        "no difference that these recordings can show: the second modulus is that of the first "
+        "(95 % sure: -5 to +6 %)"
+    )
+    assert headline(text)[1] == "95 % sure: -5 to +6 %."
+
+
 def test_a_chapter_is_folded_its_parts_are_headings_in_it_and_one_without_words_is_none():
     said = printed(
         say.Section("What for?", [say.Section("First", [say.Detail("words")])]),
@@ -301,4 +311,6 @@ def test_a_small_difference_has_its_unit_at_both_ends_of_its_interval():
         before=side, after=side, difference_pa=-4.3, difference_ci95_pa=(-1630.0, 1620.0)
     )
     *_, last = _moduli(result)
+    ratio = SimpleNamespace(ratio=0.9998, ratio_ci95=(0.95, 1.06), differs=False, explained_by=())
+    assert "that of the first (" in Changes.summary.fget(ratio), "0 % lower stood there"
     assert "-4.3 Pa" in last.text and "-1.63 kPa to +1.62 kPa" in last.text
