@@ -65,6 +65,8 @@ def verdict(result: Diagnosis) -> str:
     if not left_out and "unknown" in result.kind:
         known = f"what it knows is {there}, which the model already has"
         return f"The simulation leaves out something that this program does not know: {known}."
+    if not left_out and rivals:
+        return f"These touches show {there}, which the model already has; they cannot rule out {rivals}."
     if not left_out:
         said = f"Nothing new is missing: what these touches show is {there}, which the model already has"
     elif result.kind == "ambiguous" and rivals and not _likelier_than_not(result):

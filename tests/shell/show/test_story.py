@@ -13,7 +13,10 @@ import pytest
 
 from palpate.diagnosis.compare.before_after import Changes
 from palpate.mechanics.effects.registry import NAMES
+from palpate.reconstruction.checks.finding import Checkup
+from palpate.reconstruction.checks.registry import looked_at
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
+from palpate.show import check
 from palpate.show import story as say
 from palpate.show.changes import _moduli
 from palpate.show.comparison.figures import press_curves
@@ -36,6 +39,7 @@ from palpate.words import (
 
 from ...conftest import REPOSITORY
 from ...reconstruct.exploration_of_cylinder import explore_cylinder
+from ...support.faults import FAULTS
 
 SHOW = REPOSITORY / "shell" / "show"
 KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
@@ -179,6 +183,27 @@ def test_a_verdict_of_the_longest_names_fits_a_headline(kind):
             SimpleNamespace(kind=kind, effects=effects, candidates=candidates, entries=entries, model=model)
         )
         assert len(headline(said)[0].split()) <= MOST_WORDS, said
+
+
+def test_nothing_new_is_missing_is_not_said_where_something_may_be():
+    """It was the headline, and below it: but these touches cannot rule out skin layer."""
+    model = SimpleNamespace(material=SimpleNamespace(dent_law=""), effects={"finite_strain": {}})
+    said = verdict(
+        SimpleNamespace(
+            kind="ambiguous", effects=("finite_strain",), candidates=("skin_layer",), entries=(), model=model
+        )
+    )
+    assert headline(said) == (said, "") and "finite strain" in said and "skin layer" in said
+    assert "othing" not in said
+
+
+def test_a_grave_finding_is_named_by_the_headline_of_its_page():
+    """ "2 findings, 2 grave" stood there, and what was wrong below."""
+    rng = np.random.default_rng(0)
+    wrong = FAULTS["position in inches"].change(explore_cylinder()[0], rng)
+    found = Checkup(wrong, *looked_at(wrong))
+    (on_page,) = [b for b in check.story(found) if isinstance(b, say.Headline) and b.on == say.PAGE]
+    assert "look like inches" in on_page.text and "as it is" in on_page.text
 
 
 @pytest.mark.parametrize("kind", ["unknown", "effect+unknown", "ambiguous"])
