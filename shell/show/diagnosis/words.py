@@ -97,7 +97,8 @@ def consequence(result: Diagnosis, force_rms_n: float) -> str:
     size = f"{percent(result.gap_before_n / force_rms_n)} of its force"
     if result.kind == "none":
         return f"A typical touch is simulated to {before}, {size}; the sensor's noise alone is {noise}."
-    words = "; ".join(_what_it_is(result, name) for name in missing(result) or result.effects)
+    told = missing(result) or result.effects
+    words = "; ".join(_what_it_is(result, name) for name in told)
     said = f"{begun(words)}. " if words else ""
     if not result.effects:
         return f"A typical touch is off by {before}, {size}; the sensor's noise alone is {noise}."
@@ -106,8 +107,9 @@ def consequence(result: Diagnosis, force_rms_n: float) -> str:
         return f"{said}A typical touch is off by {before}, {size}, with or without {them}."
     near = result.gap_after_n < 1.25 * result.noise_n
     rest = f", about the sensor's noise ({noise})" if near else f"; the sensor's noise is {noise}"
+    without = them if len(told) == len(result.effects) else spoken(result.effects)
     return (
-        f"{said}Without {them} a simulated touch is typically off by {before}, {size}; with {them} by "
+        f"{said}Without {without} a simulated touch is typically off by {before}, {size}; with {them} by "
         f"{after}{rest}."
     )
 

@@ -21,7 +21,7 @@ from palpate.show import story as say
 from palpate.show.changes import _moduli
 from palpate.show.comparison.figures import press_curves
 from palpate.show.diagnosis.story import next_steps
-from palpate.show.diagnosis.words import limits, verdict, where
+from palpate.show.diagnosis.words import consequence, limits, verdict, where
 from palpate.show.page import NO_BREAK, Page, new_figure
 from palpate.words import (
     MOST_WORDS,
@@ -195,6 +195,22 @@ def test_nothing_new_is_missing_is_not_said_where_something_may_be():
     )
     assert headline(said) == (said, "") and "finite strain" in said and "skin layer" in said
     assert "othing" not in said
+
+
+def test_what_a_model_has_already_is_named_before_it_is_called_them():
+    """ "The force is read later than the position. Without them …": of two, one was told."""
+    model = SimpleNamespace(material=SimpleNamespace(dent_law=""), effects={"finite_strain": {}})
+    names = ("time_delay", "finite_strain")
+    result = SimpleNamespace(
+        kind="effect",
+        effects=names,
+        entries=(),
+        model=model,
+        gap_before_n=0.137,
+        gap_after_n=0.022,
+        noise_n=0.02,
+    )
+    assert "Without time delay and finite strain a simulated" in consequence(result, 1.0)
 
 
 def test_a_grave_finding_is_named_by_the_headline_of_its_page():
