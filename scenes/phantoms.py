@@ -247,9 +247,12 @@ def phantom(name: str | Path, *, unit: str = "m", up: str = "+z", sink_m: float 
     """A phantom by its name, or the closed surface in a file, z up, its base's middle put on the origin.
 
     unit, up, sink_m: of a file, as `mechanics.shape.flat_foot.standing` takes them.
-    Raises SceneError for an unknown name, SurfaceError for a surface that is open or has no flat foot.
+    Raises SceneError for an unknown name or what is said of no file, SurfaceError for a surface that is open
+    or has no flat foot.
     """
     if str(name) in PHANTOMS:
+        if (unit, up, sink_m) != ("m", "+z", 0.0):
+            raise SceneError(f"--unit, --up and --sink are for a surface's file; '{name}' is a phantom")
         return PHANTOMS[str(name)]()
     path = Path(name)
     if not is_surface_file(path):

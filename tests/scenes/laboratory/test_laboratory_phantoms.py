@@ -136,3 +136,8 @@ def test_a_file_in_another_unit_and_turned_is_the_same_phantom(up, tmp_path):
             0.03, rel=0.01
         )
     assert turned.vertices[:, 2].min() == pytest.approx(upright.vertices[:, 2].min(), abs=1e-6)
+
+
+def test_a_unit_is_refused_for_what_is_no_file():
+    with pytest.raises(SceneError, match="surface's file"):
+        phantom("dome", unit="mm")
