@@ -243,13 +243,16 @@ DEFAULT_MODULUS_PA = 20e3
 """Young's modulus of a phantom read from a file, Pa, where none is asked for."""
 
 
-def phantom(name: str | Path) -> Phantom:
-    """A phantom by its name, or the closed surface in a file (metres, z up), its base's middle put on the
-    origin.
+def phantom(name: str | Path, *, unit: str = "m", up: str = "+z", sink_m: float = 0.0) -> Phantom:
+    """A phantom by its name, or the closed surface in a file, z up, its base's middle put on the origin.
 
-    Raises SceneError for an unknown name, SurfaceError for a surface that is open or has no flat foot.
+    unit, up, sink_m: of a file, as `mechanics.shape.flat_foot.standing` takes them.
+    Raises SceneError for an unknown name or what is said of no file, SurfaceError for a surface that is open
+    or has no flat foot.
     """
     if str(name) in PHANTOMS:
+        if (unit, up, sink_m) != ("m", "+z", 0.0):
+            raise SceneError(f"--unit, --up and --sink are for a surface's file; '{name}' is a phantom")
         return PHANTOMS[str(name)]()
     path = Path(name)
     if not is_surface_file(path):
@@ -262,10 +265,12 @@ def phantom(name: str | Path) -> Phantom:
         )
     import trimesh
 
-    stood = standing(read_surface(path))
+    stood = standing(read_surface(path, unit), up, sink_m)
     surface = trimesh.Trimesh(stood.vertices, stood.triangles)
+    if stood.support_normal[2] < 1:
+        surface.apply_transform(trimesh.geometry.align_vectors(stood.support_normal, (0, 0, 1)))
     low, high = surface.bounds
-    surface.apply_translation([*-(low + high)[:2] / 2, -stood.support_point[2]])
+    surface.apply_translation([*-(low + high)[:2] / 2, -float(stood.support_normal @ stood.support_point)])
     for _ in range(8):
         if surface.edges_unique_length.max() <= 2.5 * SPACING_M or len(surface.faces) > 60000:
             break

@@ -6,11 +6,12 @@ import json
 import shutil
 import sys
 import threading
+from collections.abc import Collection
 from contextlib import AbstractContextManager
 from typing import Any
 
 from palpate.mechanics.disk.writing import JSON, atomic_file
-from palpate.mechanics.progress import Remaining
+from palpate.mechanics.progress import Progress, Remaining
 from palpate.mechanics.result import plain
 
 
@@ -24,6 +25,19 @@ class Output:
         """Print lines for a person, unless standard output belongs to JSON."""
         if self.destination != "-" and lines:
             print(*lines, sep="\n", flush=True)  # a pipe or file shows it while the work goes on
+
+    def stages(self, progress: Progress, first: str, brief: Collection[str] = ()) -> Progress:
+        """The same progress, which says each stage before it begins where no terminal shows its bar. first:
+        what is said before them all; brief: stages that are over at once, of which nothing is said."""
+        met: list[str] = []
+
+        def told(stage: str, fraction: float) -> None:
+            if stage not in (*met, *brief) and not sys.stderr.isatty():
+                self.say(*([] if met else [first]), f"  {stage} ...")
+                met.append(stage)
+            progress(stage, fraction)
+
+        return told
 
     def json(self, value: Any) -> None:
         """Write the answer as JSON where that was asked for."""

@@ -42,7 +42,7 @@ def warming_up(processes_of: Sequence[Sequence[str]] = BESIDE_ONE_ANOTHER) -> It
             env=dict(os.environ, OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
         )
         for stages in processes_of
-        if not _done(stages)
+        if not is_compiled(stages)
     ]
     try:
         yield lambda: [process.wait() for process in processes]
@@ -123,7 +123,8 @@ def mark_of(stage: str) -> Path | None:
     return Path(named) / f"compiled-{stage.replace(' ', '-')}-by-{version('numba')}" if named else None
 
 
-def _done(names: Sequence[str]) -> bool:
+def is_compiled(names: Sequence[str]) -> bool:
+    """Whether what these stages compile is on disk."""
     marks = [mark_of(name) for name in names]
     return all(mark is not None and mark.is_file() for mark in marks)
 

@@ -58,6 +58,7 @@ def sentence(text: str) -> str:
 
 MOST_WORDS = 20
 """Of a headline."""
+_BRACKETED = re.compile(r"^\(([^()]*)\)([.!?]?)$")
 _FLAGGED = re.compile(r"\s*\(([^()]*--[^()]*)\)")
 
 
@@ -73,6 +74,7 @@ def headline(text: str) -> tuple[str, str]:
             if within := [(a, b) for a, b in cuts if 2 < len(text[:a].split()) <= MOST_WORDS]:
                 first, rest = text[: within[-1][0]], text[within[-1][1] :]
                 break
+    rest = _BRACKETED.sub(r"\1\2", rest)
     return first, " ".join(filter(None, [rest and sentence(rest), *map(sentence, flags)]))
 
 

@@ -121,8 +121,12 @@ class Changes(Result):
 
 
 def _more(ratio: float) -> str:
-    share = 100 * abs(ratio - 1)
-    return f"{share:.0f} % {'higher' if ratio > 1 else 'lower'} than the first"
+    share = f"{100 * abs(ratio - 1):.0f}"
+    return (
+        "that of the first"
+        if share == "0"
+        else f"{share} % {'higher' if ratio > 1 else 'lower'} than the first"
+    )
 
 
 def changes(before: Side, after: Side) -> Changes:

@@ -23,7 +23,7 @@ from palpate.importing.curve_meaning import (
     unclear_signs,
 )
 from palpate.importing.headers import header_of
-from palpate.importing.mapping import Column, Said, find_columns
+from palpate.importing.mapping import Column, Said, told_columns
 from palpate.importing.meaning import (
     MOST_ODDS,
     Unclear,
@@ -115,6 +115,10 @@ def _raws(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -
     return [_raw(path.with_name(test.name), [test], said, spring, notes, odds) for test in several]
 
 
+_OF_CURVES = {"depth": "z", "load": "fz"}
+"""What one says of a curve's columns: their roles in a recording."""
+
+
 def _raw(
     path: Path,
     tables: list[Table],
@@ -124,7 +128,12 @@ def _raw(
     odds: list[float],
 ) -> RawCurves:
     """spring: N/m, of the one that reads the force, where the file states it."""
-    found = find_columns(tables, Said(columns=said.columns, units=said.units))
+    found = told_columns(tables, Said(columns=said.columns, units=said.units))
+    if missing := [f"--column {word}=NAME" for word, role in _OF_CURVES.items() if role not in found]:
+        raise RecordingError(
+            f"which columns of '{path}' are travel and load cannot be determined from their names; say "
+            f"{' and '.join(missing)}: there are {_names(tables)}"
+        )
     of_curves: tuple[str, ...] = ("t", "z", "fz")
     columns = {role: found[role] for role in of_curves if role in found}
     columns["fz"] = _force_of(path, columns["fz"], spring)

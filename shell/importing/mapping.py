@@ -178,13 +178,7 @@ def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
 
     Raises RecordingError where position or force cannot be told, naming the columns that there are.
     """
-    found = {role: _said(tables, role, text, said) for role, text in said.columns.items()}
-    for role in ROLES:
-        if role not in found:
-            guess = _guess(tables, role)
-            if guess is not None:
-                found[role] = _column(role, *guess, said, guessed=True)
-    _complete(tables, said, found)
+    found = told_columns(tables, said)
     for kind, roles in (("position", "xyz"), ("force", ("fx", "fy", "fz"))):
         missing = [role for role in roles if role not in found]
         if missing:
@@ -196,6 +190,18 @@ def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
             )
     if any(q in found for q in ROLES[7:]) and not all(q in found for q in ROLES[7:]):
         found = {role: column for role, column in found.items() if not role.startswith("q")}
+    return found
+
+
+def told_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
+    """The same of those roles alone that something tells."""
+    found = {role: _said(tables, role, text, said) for role, text in said.columns.items()}
+    for role in ROLES:
+        if role not in found:
+            guess = _guess(tables, role)
+            if guess is not None:
+                found[role] = _column(role, *guess, said, guessed=True)
+    _complete(tables, said, found)
     return found
 
 

@@ -166,6 +166,11 @@ def _plain(word: str) -> float:
         raise OptionError(f"--modulus is '{word}'; it must be a number in Pa, or NAME=PA of a part") from None
 
 
+_UNIT = option("unit of the file's lengths", choices=tuple(UNITS))
+_UP = option("direction out of the support: +z, -x, ... or X,Y,Z", metavar="AXIS")
+_SINK = option("height that is cut off flat at the bottom", unit="m")
+
+
 @dataclass(frozen=True)
 class MeshFileOptions:
     """How a surface's file (STL, OBJ, PLY, glTF, VTP, VTU, MSH, INP) is meant, where one is the object."""
@@ -176,11 +181,20 @@ class MeshFileOptions:
     poisson_ratio: float | None = field(
         default=None, metadata=option("Poisson's ratio; None: 0.49", flag="--nu")
     )
-    unit: str = field(default="m", metadata=option("unit of the file's lengths", choices=tuple(UNITS)))
-    up: str = field(
-        default="+z", metadata=option("direction out of the support: +z, -x, ... or X,Y,Z", metavar="AXIS")
-    )
-    sink_m: float = field(default=0.0, metadata=option("height that is cut off flat at the bottom", unit="m"))
+    unit: str = field(default="m", metadata=_UNIT)
+    up: str = field(default="+z", metadata=_UP)
+    sink_m: float = field(default=0.0, metadata=_SINK)
+
+
+@dataclass(frozen=True)
+class PhantomFileOptions:
+    """How a surface's file is meant, where one is the phantom."""
+
+    title = "a surface's file as the phantom"
+
+    unit: str = field(default="m", metadata=_UNIT)
+    up: str = field(default="+z", metadata=_UP)
+    sink_m: float = field(default=0.0, metadata=_SINK)
 
 
 _FLAGS = {"young_modulus_pa": "modulus", "poisson_ratio": "nu", "sink_m": "sink", "columns": "column"}

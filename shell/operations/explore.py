@@ -27,8 +27,8 @@ from palpate.mechanics.options import check_ranges
 from palpate.mechanics.plausible import POISSON_RATIO
 from palpate.mechanics.recording.recording import read_recording
 from palpate.operations._call import Call
-from palpate.operations._declare import operation, option
-from palpate.operations._shared import SAMPLES, Seed, output_option, report_option
+from palpate.operations._declare import Given, operation, option
+from palpate.operations._shared import SAMPLES, PhantomFileOptions, Seed, output_option, report_option
 from palpate.operations.simulate import effects_from
 from palpate.robot import LaboratoryRobot, RobotOptions, serve
 from palpate.scenes.laboratory.session import SimulateOptions
@@ -91,6 +91,7 @@ def explore(
         ),
     ] = None,
     seed: Seed = 0,
+    file: Given[PhantomFileOptions],
     goals: GoalOptions,
     reach: ReachOptions,
     errors: RobotOptions,
@@ -109,7 +110,7 @@ def explore(
         given = {"device": device, "seed": seed, "seconds": seconds, "screenshot": screenshot}
         result = _in_window(begun, output, scene, given, call)
     else:
-        thing = named(str(phantom))
+        thing = named(str(phantom), **file)
         options = SimulateOptions(young_modulus_pa=young_modulus_pa, tip_radius_m=tip_radius_m)
         check_ranges(options)
         acting = effects_from(effects) or {}

@@ -1,7 +1,7 @@
 """The virtual laboratory: a person explores a phantom, and what a device would have read is recorded.
 
 PHANTOM is a name (cylinder, block, half-sphere, bean, dome, wedge, bowl) or a closed STL, PLY or VTU
-surface in metres that stands on its lowest plane. Without --effect the object is the ideal model: linear
+surface. Without --effect the object is the ideal model: linear
 elastic, bonded to its support, sticking to the tip, readings exact but for white and slow noise. Solved
 touches are kept in the user's cache (PALPATE_CACHE), so that another seed, modulus, hand or instrument
 takes seconds, and an interrupted run goes on where it stopped.
@@ -20,7 +20,7 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import number, pairs, unknown
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, argument, operation, option
-from palpate.operations._shared import SAMPLES, Seed, report_option, save_option
+from palpate.operations._shared import SAMPLES, PhantomFileOptions, Seed, report_option, save_option
 from palpate.operations._to_argparse import natural
 from palpate.output import emit_json
 from palpate.scenes.laboratory.effects import REGISTRY
@@ -107,13 +107,14 @@ def simulate(
         ),
     ] = None,
     seed: Seed = 0,
+    file: Given[PhantomFileOptions],
     options: SimulateOptions,
     hand: Given[HandOptions],
     call: Call,
 ) -> Simulation:
     """The virtual laboratory: a person explores a phantom, and what a device would have read is recorded.
 
-    phantom: one of the names or a closed STL, PLY or VTU surface, m. effects: name to strength; none is the
+    phantom: one of the names or a closed STL, PLY or VTU surface. effects: name to strength; none is the
     ideal model. save: NAME.csv.gz, with the truth in NAME.toml. Solved touches are kept in the user's cache.
     Raises OptionError or SceneError.
     """
@@ -131,7 +132,7 @@ def simulate(
     if seal and report:
         raise OptionError("--seal withholds the truth, which --report would show: give one of them")
     acting = effects_from(effects)
-    thing = phantom if isinstance(phantom, Phantom) else named(phantom)
+    thing = phantom if isinstance(phantom, Phantom) else named(phantom, **file)
     with call.progress("simulate") as show_progress:
         made = simulated(
             thing,

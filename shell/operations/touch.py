@@ -32,7 +32,7 @@ from palpate.operations._call import Call
 from palpate.operations._declare import EachOf, Given, argument, operation, option
 from palpate.operations._shared import SAMPLES, MeshFileOptions, Seed, given_model, given_scene, with_friction
 from palpate.operations.load import load
-from palpate.output import progress_bar
+from palpate.output import Output, progress_bar
 from palpate.render.options import RenderOptions
 from palpate.render.registry import names
 from palpate.scenes.build import model_of
@@ -40,7 +40,7 @@ from palpate.scenes.scene import Scene, load_scene, scene_names
 from palpate.scenes.virtual_presses import ExplorationOptions, explore
 from palpate.servo import ServoOptions, ServoReport
 from palpate.servo.started import StartedServo
-from palpate.warm_up import OF_A_TOUCH, OF_ITS_SERVO, warming_up
+from palpate.warm_up import OF_A_TOUCH, OF_ITS_SERVO, is_compiled, warming_up
 from palpate.window.session import SessionOptions, TouchSession
 from palpate.words import typed_word
 
@@ -50,6 +50,9 @@ if TYPE_CHECKING:
 
 POLL_S = 0.1
 DEFAULT = "demo"
+_ONCE = "new here, so it is prepared once and kept, which takes a minute or more:"
+_BRIEF = ("starting", "loading the model", "compiling the loop", "touching")
+"""Stages of every touch, of objects that are known here too."""
 _NOT_RECORDED = "keep the touch, for reconstruct, compare and diagnose: --record REC.csv.gz"
 
 
@@ -183,7 +186,7 @@ def touch(
             compiling=compiling,
         )
         if headless:
-            touched: ServoRun | None = _without(opening, scene or DEFAULT, seconds)
+            touched: ServoRun | None = _without(opening, scene or DEFAULT, seconds, call.out)
         else:
             picture = None if screenshot is None else Path(screenshot)
             touched = _in_window(opening, scene, seconds, guide, picture)
@@ -222,13 +225,14 @@ def _named(scene: Any) -> str | None:
     return str(model.path)
 
 
-def _without(opening: _Opening, name: str, seconds: float | None) -> ServoRun:
-    """Touch without a window."""
+def _without(opening: _Opening, name: str, seconds: float | None, out: Output) -> ServoRun:
+    """Touch without a window, and say before what takes long: an object that is new here is meshed and
+    solved for a minute or more, and a new installation compiles."""
     scene = opening.scene(name)
     with ExitStack() as stack:
         servo = stack.enter_context(StartedServo(OF_ITS_SERVO))
         with progress_bar("touch") as bar:
-            session, until = opening.session(stack, servo, scene, None, bar)
+            session, until = opening.session(stack, servo, scene, None, out.stages(bar, _ONCE, _BRIEF))
         session.enable()
         _wait(session, until if seconds is None else seconds)
         return opening.touched(session, scene)
@@ -262,7 +266,7 @@ class _Opening:
         options, mapping = self.session_of(scene), self.mapping(scene, model)
 
         def compiled() -> None:
-            if options.renderer == "fem":
+            if options.renderer == "fem" and not all(map(is_compiled, OF_A_TOUCH)):
                 show_progress("compiling, once after an installation", 0.5)
                 self.compiling()
 

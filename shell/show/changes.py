@@ -59,7 +59,7 @@ def _moduli(result: Changes) -> say.Story:
         named = f"; {verdict(side.diagnosis)}" if side.diagnosis is not None else ""
         yield say.TextLine(f"{words}, {side.recording.name}: {kpa(side.modulus_pa)} ({interval}){named}")
     low, high = result.difference_ci95_pa
-    interval = sure(f"{low / 1e3:+.2f}", f"{high / 1e3:+.2f}")
+    interval = sure(kpa(low, "+.2f"), kpa(high, "+.2f"))
     yield say.TextLine(f"difference {kpa(result.difference_pa, '+.2f')} ({interval})")
 
 
@@ -71,7 +71,7 @@ def _cards(result: Changes) -> list[tuple[str, str, str]]:
         cause, beside = listed(named) or "nothing", ""
     if result.beside is not None:
         left = 100 * (result.beside[0] - 1)
-        beside = f"with the effects of both taken into account, the moduli differ by {left:+.0f} %"
+        beside = f"with the effects of both taken into account, the moduli differ by {left:+z.0f} %"
     there = ("no shared places", "the two recordings share too few places, or no frame")
     if result.places:
         there = (
@@ -79,8 +79,8 @@ def _cards(result: Changes) -> list[tuple[str, str, str]]:
             "places within 12 mm of one another, each with its own ratio",
         )
     differ = "yes" if result.differs else "not beyond their intervals"
-    interval = sure(f"{low:+.0f}", f"{high:+.0f} %")
-    size = f"second modulus less the first: {100 * (result.ratio - 1):+.0f} % ({interval})"
+    interval = sure(f"{low:+z.0f}", f"{high:+z.0f} %")
+    size = f"second modulus less the first: {100 * (result.ratio - 1):+z.0f} % ({interval})"
     return [
         ("Do they differ?", differ, size),
         ("What explains it?", cause, beside),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,7 +37,9 @@ def story(result: Checkup) -> say.Story:
     said = f"{counted(len(findings), 'finding')}, {len(result.grave)} grave"
     said = said if findings else f"no findings in its {looked}"
     presses = {None: "", 1: ", 1 press"}.get(result.presses, f", {result.presses} presses")
-    yield say.Headline(f"{recording.name}, {recording.duration_s:.1f} s{presses}: {said}")
+    said = f"{recording.name}, {recording.duration_s:.1f} s{presses}: {said}"
+    yield say.Headline(said, on=say.TEXT)
+    yield say.Headline(_lead(result.grave) if result.grave else said, on=say.PAGE)
     yield say.Sentence(_meaning(result), on=say.PAGE)
     yield say.Next(_next_steps(result))
     yield from (say.TextLine(finding.line()) for finding in findings)
@@ -108,6 +111,13 @@ def draw(result: Checkup, ax: Axes) -> None:
 def _seen(words: str, here: float, usual: float) -> list[object]:
     label, values = readable(words, [here, usual])
     return [label, *values]
+
+
+def _lead(grave: Sequence[Finding]) -> str:
+    """What is wrong, in a few words; its figures stand in the finding's chapter."""
+    first, *more = grave
+    beside = f"; and {len(more)} more" if more else ""
+    return f"Not to be used as it is: {first.name}, {first.saw.partition(': ')[0]}{beside}"
 
 
 def _meaning(result: Checkup) -> str:

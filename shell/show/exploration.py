@@ -35,7 +35,8 @@ def story(result: Explored) -> say.Story:
     yield say.Detail(how, on=say.TEXT)
     soft = np.isfinite(state.modulus_pa)
     soft_words = f"About as soft as {softness(state.modulus_pa)}. " if soft else ""
-    yield say.Sentence(f"{soft_words}The exploration {how}", on=say.PAGE)
+    why = how.removesuffix(f": {state.words}")  # which stands above
+    yield say.Sentence(f"{soft_words}The exploration {why}", on=say.PAGE)
     if state.trouble:
         yield say.Sentence(f"The last touch could not be used: {state.trouble}", on=say.PAGE)
     go_on = f"go on: the same command with `--continue {recording}`"

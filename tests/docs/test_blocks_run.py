@@ -14,12 +14,14 @@ import pytest
 
 import palpate as pp
 from palpate import cli
+from tests.reconstruct.flat_ground import raster
 from tests.shell.importing.test_meaning import press, write
 from tests.support.waiting import eventually
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 DOCS = REPOSITORY / "docs"
 GUIDE = [p for folder in ("tutorials", "howto") for p in sorted((DOCS / folder).glob("*.md"))]
+GUIDE.append(DOCS / "reference" / "conformance.md")
 OTHERS = ("pip", "dask", "python3", "source", ".venv/bin/python", ".venv/bin/palpate")
 """Other programs; of them CI runs what installs and starts this one."""
 
@@ -53,6 +55,13 @@ def a_dent(folder: Path) -> None:
         write(folder / f"{name}.csv", [t, 12 - 1e3 * depth, -force], "Time (s),Height (mm),Load (N)")
 
 
+def a_palpation(folder: Path) -> None:
+    """A robot's presses on something flat."""
+    seen = raster((4, 4))
+    rows = [seen.t, 1e3 * seen.position, seen.force_on_tool]
+    write(folder / "palpation.csv", rows, "t [s],x [mm],y [mm],z [mm],fx [N],fy [N],fz [N]")
+
+
 def a_part(folder: Path) -> None:
     """As parts come: in mm, turned, and far from the file's origin."""
     import trimesh
@@ -73,9 +82,13 @@ RUN: dict[str, Callable[[Path], None]] = {
     "howto/open-anything.md": a_dent,
     "howto/own-data.md": a_robots_table,
     "howto/press-a-page.md": nothing,
+    "howto/robot-log.md": a_palpation,
     "howto/write-a-device.md": nothing,
+    "reference/conformance.md": nothing,
 }
 """Page: what makes the files that its commands name."""
+EVERY_DAY = ("howto/device.md", "howto/robot-log.md", "reference/conformance.md")
+"""Pages whose commands take some seconds each."""
 CHEAPLY = {"MODEL": "demo", "REC": "REC.csv", "FILE...": "FILE.csv", "dent.csv": "dent.csv --fast"}
 WIDELY = {"material": ["--fast", "--travel", "out"]}
 """What is said beside, so that a stand-in costs little: fewer effects."""
@@ -84,17 +97,15 @@ ELSEWHERE = {
     "palpate batch": "tests/shell/batch/test_batch_recordings.py",
     "palpate calibrate": "tests/reconstruct/test_calibration.py",
     "palpate check REC --full": "tests/shell/test_check_command.py",
-    "palpate compare": "tests/diagnose/compare",
-    "palpate devices --measure": "tests/devices/test_devices_command.py",
+    "palpate compare before.csv.gz": "tests/diagnose/compare",
+    "palpate compare silicone-1-cylinder": "tests/diagnose/compare",
     "palpate diagnose": "examples/plot_05_a_slow_sensor.py",
-    "palpate export silicone-1-cylinder": "tests/shell/exporting/test_recorded.py",
     "palpate explore": "tests/diagnose/explore",
     "palpate import bag_folder": "tests/shell/importing/test_import.py",
-    "palpate import palpation.csv": "tests/shell/importing/test_import.py",
     "palpate material FILE...": "tests/diagnose/specimen",
     "palpate material dent.xlsx": "tests/shell/importing/test_sheets.py",
     "palpate open FILE...": "tests/shell/operations/test_open.py",
-    "palpate open palpation.csv": "tests/reconstruct/test_sliding_on_a_slab.py",
+    "palpate open palpation.csv --tip-radius 0.004 --shape": "tests/reconstruct/test_known_geometry.py",
     "palpate reconstruct": "tests/reconstruct/test_command.py",
     "palpate simulate": "tests/scenes/laboratory",
     "palpate tune": "tests/diagnose/test_tuning.py",
@@ -148,8 +159,16 @@ def test_what_does_the_same_is_there():
     assert all((REPOSITORY / path).exists() for path in ELSEWHERE.values())
 
 
-@pytest.mark.release
-@pytest.mark.parametrize("page", [p for p in GUIDE if name_of(p) in RUN], ids=name_of)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(
+            p, id=name_of(p), marks=pytest.mark.slow if name_of(p) in EVERY_DAY else pytest.mark.release
+        )
+        for p in GUIDE
+        if name_of(p) in RUN
+    ],
+)
 def test_the_commands_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     RUN[name_of(page)](tmp_path)

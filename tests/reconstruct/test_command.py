@@ -102,7 +102,7 @@ def test_too_few_presses_are_found(files, tmp_path, capsys):
         (("--contact-threshold", "0"), "greater than 0"),
         (("--cutoff", "-3"), "from 1 to 10000 Hz"),
         (("--mesh-size", "0"), "--mesh-size"),
-        (("--method", "paper"), "usable palpations"),
+        (("--method", "paper"), "usable presses"),
         (("--beside", "nowhere"), "no MODEL folder"),
         (("--base-spacing", "0"), "--base-spacing"),
         (("--indentation", "-0.01"), "--indentation"),

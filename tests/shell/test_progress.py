@@ -110,3 +110,26 @@ def test_what_is_said_on_the_way_reaches_a_pipe_at_once(tmp_path, monkeypatch):
     output.Output().say("picture: rec.png")
     assert (tmp_path / "out.txt").read_text() == "picture: rec.png\n"
     told.close()
+
+
+def test_stages_are_said_where_no_terminal_shows_a_bar_each_before_it_begins(capsys, monkeypatch):
+    """Whoever reads a pipe saw nothing of two minutes' work, and thought that it hung."""
+
+    def tell() -> str:
+        told = output.Output().stages(lambda *_: None, "once:", brief=("starting",))
+        told("starting", 0.0)
+        before = capsys.readouterr().out
+        told("meshing", 0.1)
+        seen = capsys.readouterr().out
+        told("meshing", 0.9)
+        told("solving", 0.9)
+        return before + seen + capsys.readouterr().out
+
+    assert tell() == "once:\n  meshing ...\n  solving ...\n"
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    assert tell() == ""
+
+
+def test_standard_output_that_belongs_to_json_holds_no_stages(capsys):
+    output.Output("-").stages(lambda *_: None, "once:")("meshing", 0.0)
+    assert capsys.readouterr().out == ""

@@ -271,7 +271,7 @@ def _too_few(
             "recording's TOML"
         )
     return FewPressesError(
-        f"{counts[0]} usable palpations among {counts[1]} contacts of phase II{why}; at least "
+        f"{counts[0]} of {counts[1]} contacts are usable presses{why}; at least "
         f"{request.least_presses} {'is' if request.least_presses == 1 else 'are'} needed: {hint}",
         0 if below else counts[0],
     )

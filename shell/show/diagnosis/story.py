@@ -32,6 +32,7 @@ from palpate.show.diagnosis.words import (
     meaning,
     missing,
     named,
+    touch_parts,
     touch_words,
     verdict,
     where,
@@ -148,7 +149,7 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
     if not asked:
         yield feel_step(model.path, f"palpate reconstruct {recording} -o MODEL")
     if result.next_touch is not None and result.unsettled:
-        yield "touch once more, at the place of the next touch, to decide between the candidates"
+        yield f"make the next touch that is described here: it is to tell {touch_parts(result.next_touch)}"
 
 
 def _caption(result: Diagnosis) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.diagnosis.verdict.result import Diagnosis, NextTouch
 from palpate.mechanics.effects.base import Scope
 from palpate.mechanics.effects.registry import effect
 from palpate.show.diagnosis.gaps import depth_contrast, in_model, press_gaps, worst_press
@@ -65,6 +65,8 @@ def verdict(result: Diagnosis) -> str:
     if not left_out and "unknown" in result.kind:
         known = f"what it knows is {there}, which the model already has"
         return f"The simulation leaves out something that this program does not know: {known}."
+    if not left_out and rivals:
+        return f"These touches show {there}, which the model already has; they cannot rule out {rivals}."
     if not left_out:
         said = f"Nothing new is missing: what these touches show is {there}, which the model already has"
     elif result.kind == "ambiguous" and rivals and not _likelier_than_not(result):
@@ -95,7 +97,8 @@ def consequence(result: Diagnosis, force_rms_n: float) -> str:
     size = f"{percent(result.gap_before_n / force_rms_n)} of its force"
     if result.kind == "none":
         return f"A typical touch is simulated to {before}, {size}; the sensor's noise alone is {noise}."
-    words = "; ".join(_what_it_is(result, name) for name in missing(result) or result.effects)
+    told = missing(result) or result.effects
+    words = "; ".join(_what_it_is(result, name) for name in told)
     said = f"{begun(words)}. " if words else ""
     if not result.effects:
         return f"A typical touch is off by {before}, {size}; the sensor's noise alone is {noise}."
@@ -104,8 +107,9 @@ def consequence(result: Diagnosis, force_rms_n: float) -> str:
         return f"{said}A typical touch is off by {before}, {size}, with or without {them}."
     near = result.gap_after_n < 1.25 * result.noise_n
     rest = f", about the sensor's noise ({noise})" if near else f"; the sensor's noise is {noise}"
+    without = them if len(told) == len(result.effects) else spoken(result.effects)
     return (
-        f"{said}Without {them} a simulated touch is typically off by {before}, {size}; with {them} by "
+        f"{said}Without {without} a simulated touch is typically off by {before}, {size}; with {them} by "
         f"{after}{rest}."
     )
 
@@ -238,11 +242,17 @@ def short_verdict(kind: str, effects: Sequence[str], candidates: Sequence[str]) 
     return listed(said) or kind
 
 
+def touch_parts(touch: NextTouch) -> str:
+    """'A from B': what the next touch separates, of candidates or, where nothing known explains the gap, of
+    what comes nearest to it."""
+    return " from ".join(map(spaced, touch.separates))
+
+
 def touch_words(result: Diagnosis) -> str:
     """Where and how to touch next, and what that would tell."""
     touch = result.next_touch
     assert touch is not None
-    parted = " from ".join(map(spaced, touch.separates))
+    parted = touch_parts(touch)
     if touch.kind != "press":
         return f"to separate {parted}: {touch.why}"
     direction = ", ".join(f"{round(d, 2) + 0.0:g}" for d in touch.direction)

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from palpate.mechanics.errors import SceneError, SurfaceError
+from palpate.mechanics.shape.flat_foot import direction
 from palpate.scenes.laboratory.hand import HandOptions
 from palpate.scenes.laboratory.mesh import graded_mesh
 from palpate.scenes.laboratory.presses import FLOOR_MM, RIM_MM, press_set
@@ -119,3 +120,24 @@ def test_the_whole_foot_of_a_phantom_is_held(name: str) -> None:
 def _area(points: np.ndarray, faces: np.ndarray) -> float:
     a, b, c = (points[faces[:, k]] for k in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+@pytest.mark.parametrize("up", ["-z", "+x", "0.2,0,1"])
+def test_a_file_in_another_unit_and_turned_is_the_same_phantom(up, tmp_path):
+    """Its refusal named a unit and a direction that no command about phantoms took."""
+    cone = trimesh.creation.cone(0.03, 0.05, sections=40)
+    cone.export(tmp_path / "upright.stl")
+    cone.apply_transform(trimesh.geometry.align_vectors((0, 0, 1), direction(up)))
+    cone.apply_scale(1e3).apply_translation((40, 70, -20)).export(tmp_path / "turned.stl")
+    upright, turned = phantom(tmp_path / "upright.stl"), phantom(tmp_path / "turned.stl", unit="mm", up=up)
+    for given in (upright, turned):
+        assert np.ptp(given.vertices[:, 2]) == pytest.approx(0.05, rel=1e-4)
+        assert np.hypot(*given.vertices[given.vertices[:, 2] < 1e-5].T[:2]).max() == pytest.approx(
+            0.03, rel=0.01
+        )
+    assert turned.vertices[:, 2].min() == pytest.approx(upright.vertices[:, 2].min(), abs=1e-6)
+
+
+def test_a_unit_is_refused_for_what_is_no_file():
+    with pytest.raises(SceneError, match="surface's file"):
+        phantom("dome", unit="mm")

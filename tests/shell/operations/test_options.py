@@ -19,7 +19,7 @@ from palpate.diagnosis.other_simulator.forces import ForcesOptions
 from palpate.operations._declare import check_options, declared, operation_of, written
 from palpate.operations._list import OPERATIONS, calls
 from palpate.operations._run import command_operation, parser_of
-from palpate.operations._shared import MeshFileOptions
+from palpate.operations._shared import MeshFileOptions, PhantomFileOptions
 
 from ...render import shapes
 
@@ -129,7 +129,7 @@ def test_every_option_reaches_its_room(rooms, recording, name):
         f.name: kind
         for kind in operation_of(name).kinds
         for f in declared(kind)
-        if kind is not MeshFileOptions and f.name != "seed"
+        if kind not in (MeshFileOptions, PhantomFileOptions) and f.name != "seed"
     }
     every = [option for option in pp.options(name) if option.name in homes]
     assert {option.name for option in every} == set(homes)

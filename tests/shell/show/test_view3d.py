@@ -88,9 +88,12 @@ def test_an_object_whose_presses_have_no_curves_is_turned_too(shown, tmp_path):
     page, seen = Page("A ball"), a_view()
     page.view(View(seen.thing, seen.places, seen.colourings), Figure(figsize=(3, 2)), "The picture.")
     shown.complaints.clear()
-    shown.open(page.write(tmp_path / "plain.html"))
+    shown.open(page.write(tmp_path / "plain.html"), 1366, 768)
     shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
     assert shown.complaints == []
+    # half of the screen stayed empty, where the curve of a press would be
+    wide = shown.evaluate("document.querySelector('section.view3d').getBoundingClientRect().width")
+    assert stage(shown)[2] > 0.95 * wide
 
 
 def stage(tab) -> tuple[float, float, float, float]:

@@ -46,6 +46,26 @@ def test_headless_session_with_a_recording(
 
 
 @pytest.mark.slow
+def test_what_takes_long_is_said_before_and_an_object_that_is_known_is_felt_without_a_word(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """A new object was meshed and solved for two minutes, and not a line was printed."""
+    trimesh = pytest.importorskip("trimesh")
+    # kernels stay where they are: what compiles has its own folder
+    monkeypatch.setattr("palpate.scenes.kept.cache_folder", lambda: tmp_path / "cache")
+    trimesh.creation.box((0.04, 0.04, 0.02)).apply_translation((0, 0, 0.01)).export(tmp_path / "box.stl")
+    words = ["touch", str(tmp_path / "box.stl"), "--modulus", "9000", "--headless", "--seconds", "1"]
+    said = []
+    for _ in range(2):
+        assert main(words) == 0
+        out, err = capsys.readouterr()
+        assert not err
+        said.append([line for line in out.splitlines() if line.endswith(" ...")])
+    assert len(said[0]) > 3 and len(set(said[0])) == len(said[0]) and "meshing" in said[0][0]
+    assert not [line for line in said[1] if "compiling" not in line]
+
+
+@pytest.mark.slow
 def test_an_object_far_from_the_origin_is_felt_as_it_is_rendered(block: Model, tmp_path: Path) -> None:
     """The hand in the program works over the object, wherever its mesh lies."""
     shift = np.array([1.3, -0.4, 0.2])
