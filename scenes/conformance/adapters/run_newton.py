@@ -12,7 +12,7 @@ warp.config.log_level = warp.LOG_WARNING
 
 
 def scene(body, physics, count):
-    """(model, spheres' shapes): the spheres' radius is less by the skin that is around the body."""
+    """The model, its shapes the spheres in their order: their radius is less by the skin around the body."""
     young, nu = physics["young_modulus_pa"], physics["poisson_ratio"]
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
     hard = newton.ModelBuilder.ShapeConfig(ke=CONTACT_N_PER_M, kd=0.0, mu=physics["friction"])
@@ -35,10 +35,8 @@ def scene(body, physics, count):
 
 
 def press(body, physics, t, centres):
-    """(n, tips, 3) N; nan for more than one tip."""
+    """(n, tips, 3) N."""
     count = centres.shape[1]
-    if count > 1:
-        return np.full(centres.shape, np.nan)  # contact_f is not told apart by sphere here
     model = scene(body, physics, count)
     collisions = newton.CollisionPipeline(
         model, soft_contact_gap=0.002, enable_rigid_soft_full_surface_contact=True
@@ -63,7 +61,9 @@ def press(body, physics, t, centres):
         then.body_q.assign(pose(at))
         solver.step(now, then, None, contacts, STEP_S, observables=seen)
         states.reverse()
-        return seen.contact_f.numpy()[contacts.rigid_contact_max :, :3].sum(axis=0, dtype=float)[None]
+        on, force = contacts.soft_contact_shape.numpy(), seen.contact_f.numpy()
+        force = force[contacts.rigid_contact_max :, :3]
+        return np.array([force[on == ball].sum(axis=0, dtype=float) for ball in range(count)])
 
     return stepped(t, centres, STEP_S, advance)
 
