@@ -44,7 +44,11 @@ def two_logs(folder: Path) -> None:
 def a_curve(folder: Path) -> None:
     """With names that nobody knows, two of a unit."""
     t, depth, force = press()
-    write(folder / "curve.csv", [t, 1e3 * depth, depth, force, 0.1 * force], "t (s),aa (mm),cc (mm),bb (N),dd (N)")
+    write(
+        folder / "curve.csv",
+        [t, 1e3 * depth, depth, force, 0.1 * force],
+        "t (s),aa (mm),cc (mm),bb (N),dd (N)",
+    )
 
 
 def a_wild_log(folder: Path) -> None:
