@@ -14,13 +14,12 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.shape.nearest import farthest_apart, first_hits, sample
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.base import Renderer
+from palpate.render.force_error import thickness_under
 from palpate.render.registry import create
 
 TIP_M, DEEPEST_M, LEAST_M = 5e-3, 2e-3, 1e-4
 _TIP_SHARE, _DEPTH_SHARE = 0.12, 0.12
 """Of the object's least extent: its tip; of what lies under a place: its depth, at most DEEPEST_M."""
-_SAGITTA = 0.05
-"""Tips within which a triangle does not count as the other side."""
 _HERTZ_SHARE, _HERTZ_RADII = 0.4, 0.1
 """Of the tip by which Hertz is asked; and how deep, radii."""
 _THICK, _GENTLE, _RIM = 75.0, 0.1, 6.0
@@ -72,8 +71,7 @@ def places_of(model: Model, count: int, seed: int = 5) -> Places:
     able = np.flatnonzero(free & from_above & (height + tip * (normals @ up - 1) > 0.6 * tip))
     able = able[farthest_apart(points[able], count)]
     points, normals = points[able], normals[able]
-    # the shape is smooth, rays meet its triangles: the one that a place lies in is up to a sagitta away
-    under = first_hits(shape.vertices, shape.triangles, points, -normals, beyond=_SAGITTA * tip)[0]
+    under = thickness_under(shape, points, normals, tip)
     thickness = np.where(np.isfinite(under), under, 0.0)
     bends = shape.curvatures(points, normals, tip)[0].mean(axis=1) if len(points) else np.zeros(0)
     depth = np.clip(_DEPTH_SHARE * thickness, LEAST_M, min(DEEPEST_M, 0.4 * tip))

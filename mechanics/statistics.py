@@ -36,10 +36,10 @@ class Robust(Generic[Fitted]):
     scale: float
 
 
-def read_columns(values: np.ndarray) -> np.ndarray:
-    """Of (n, k) readings the columns that ever change: the others are none that is read, as of a machine of
-    one axis, and say nothing of the noise."""
-    return values[:, np.ptp(values, axis=0) > 0]
+def are_read(values: np.ndarray) -> np.ndarray:
+    """(k,) bool: which columns of (n, k) readings ever change: the others are none that is read, as of a
+    machine of one axis, and say nothing of the noise."""
+    return np.ptp(values, axis=0) > 0
 
 
 def spread(values: np.ndarray, axis: int | None = None) -> np.ndarray | float:

@@ -21,6 +21,7 @@ from palpate.mechanics.law_errors import Bound
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.mechanics.shape.nearest import first_hits
+from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.base import Renderer
 from palpate.render.effects import rendered_touch
 from palpate.render.fem.renderer import FemRenderer
@@ -135,14 +136,22 @@ def place_numbers(
     return np.stack([bent * tip_radius_m, way_aside(give, sideways, tip_radius_m), rim, base, uneven, wall])
 
 
+def thickness_under(
+    shape: TrueShape, points: np.ndarray, normals: np.ndarray, tip_radius_m: float
+) -> np.ndarray:
+    """(k,) m of a known shape below its places; infinite where nothing lies behind."""
+    # rays meet the triangles, which lie a little beside the curved shape's places
+    beyond = _SAGITTA * tip_radius_m
+    return first_hits(shape.vertices, shape.triangles, points, -normals, beyond=beyond)[0]
+
+
 def _through(model: Model, points: np.ndarray, normals: np.ndarray, tip_radius_m: float) -> np.ndarray:
     """(k,) squared, the width of a contact over the thickness of a known shape's wall with air behind it; 0
     over the support, or where no shape is known."""
     shape, width = model.mesh.shape, contact_width(tip_radius_m)
     if shape is None or not len(points):
         return np.zeros(len(points))
-    # rays meet the triangles, which lie a little beside the curved shape's places
-    thick = first_hits(shape.vertices, shape.triangles, points, -normals, beyond=_SAGITTA * tip_radius_m)[0]
+    thick = thickness_under(shape, points, normals, tip_radius_m)
     free = np.isfinite(thick)
     behind = points[free] - thick[free, None] * normals[free]
     free[free] = model.support.height(behind) > _SAGITTA * tip_radius_m

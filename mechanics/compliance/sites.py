@@ -231,13 +231,9 @@ def uneven_curvature(
     it, as in a groove as narrow as a tip; 0 where no shape is known, whose curvature is fitted to nodes."""
     if mesh.shape is None or not len(points):
         return np.zeros(len(points))
-    whole, middle = (
-        ellipse_curvature(
-            mesh.shape.curvatures(points, normals, share * contact_width(tip_radius_m))[0], tip_radius_m
-        )
-        for share in (1.0, _MIDDLE)
-    )
-    return np.abs(middle - whole)
+    middle = mesh.shape.curvatures(points, normals, _MIDDLE * contact_width(tip_radius_m))[0]
+    whole = contact_curvature(mesh, points, normals, tip_radius_m)
+    return np.abs(ellipse_curvature(middle, tip_radius_m) - whole)
 
 
 def principal_curvatures(

@@ -12,7 +12,7 @@ from palpate.mechanics.presses.repeats import SITE_M, sites_of
 from palpate.mechanics.presses.table import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import ON_SUPPORT, TimeSegment, runs
-from palpate.mechanics.statistics import spread_about_zero
+from palpate.mechanics.statistics import are_read, spread_about_zero
 
 AROUND_S = 0.3
 """Samples are kept this long before first and after last touch."""
@@ -85,7 +85,7 @@ def measured_noise(
         lasting = min(1.0, held / per_step)
         step = stated * np.sqrt(max(lasting, 1 / per_step))
         return Noise(stated, step, float(np.clip(held / per_step, 1.0, 10.0)))
-    axes = np.ptp(recording.force_on_tool, axis=0) > 0  # a machine of one axis reads nothing of the others
+    axes = are_read(recording.force_on_tool)
     force = recording.force_on_tool[:, axes]
     if free.sum() < 200 * per_step or not force.size:
         return Noise(stated, stated / np.sqrt(per_step), 1.0)

@@ -106,13 +106,12 @@ def _raws(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -
     tables = read_tables(path)
     if not said.columns and tuple(tables[0].columns) == PRESS_COLUMNS:
         return [_of_press(path, tables[0], notes)]
-    spring = header_of(path).spring_n_per_m
     tests = [side_by_side(table) for table in tables]
     several = max(tests, key=len)
     if len(several) < 2:
-        return [_raw(path, tables, said, spring, notes, odds)]
+        return [_raw(path, path, tables, said, notes, odds)]
     notes.append(f"'{path.name}' holds {len(several)} tests side by side")
-    return [_raw(path.with_name(test.name), [test], said, spring, notes, odds) for test in several]
+    return [_raw(path.with_name(test.name), path, [test], said, notes, odds) for test in several]
 
 
 _OF_CURVES = {"depth": "z", "load": "fz"}
@@ -121,13 +120,13 @@ _OF_CURVES = {"depth": "z", "load": "fz"}
 
 def _raw(
     path: Path,
+    file: Path,
     tables: list[Table],
     said: SaidOfCurves,
-    spring: float | None,
     notes: list[str],
     odds: list[float],
 ) -> RawCurves:
-    """spring: N/m, of the one that reads the force, where the file states it."""
+    """path: of the curve's own name; file: that holds it."""
     found = told_columns(tables, Said(columns=said.columns, units=said.units))
     if missing := [f"--column {word}=NAME" for word, role in _OF_CURVES.items() if role not in found]:
         raise RecordingError(
@@ -136,7 +135,7 @@ def _raw(
         )
     of_curves: tuple[str, ...] = ("t", "z", "fz")
     columns = {role: found[role] for role in of_curves if role in found}
-    columns["fz"] = _force_of(path, columns["fz"], spring)
+    columns["fz"] = _force_of(file, columns["fz"])
     z, push = (np.asarray(columns[role].values, float) for role in ("z", "fz"))
     t = np.asarray(columns["t"].values, float) if "t" in columns else np.arange(z.size) / _UNTIMED_HZ
     if t.ndim == 0 or z.ndim == 0 or push.ndim == 0 or len({len(t), len(z), len(push)}) > 1:
@@ -160,12 +159,13 @@ def _raw(
     return RawCurves(path, t[fresh], z[fresh], push[fresh], columns)
 
 
-def _force_of(path: Path, column: Column, spring: float | None) -> Column:
-    """A column of force, in N of the spring where it is how far that bends. Raises RecordingError where no
-    file states the spring."""
+def _force_of(path: Path, column: Column) -> Column:
+    """A column of force, in N of the file's spring where it is how far that bends. Raises RecordingError
+    where the file does not state it."""
     length = unit_in(column.name, "position")
     if length is None:
         return column
+    spring = header_of(path).spring_n_per_m
     if spring is None:
         raise RecordingError(
             f"'{path}': '{column.name}' is a length, as of a spring that bends, and the file does not state "

@@ -14,7 +14,7 @@ from scipy.signal import butter, savgol_filter, sosfiltfilt
 
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import option
-from palpate.mechanics.statistics import read_columns, spread
+from palpate.mechanics.statistics import are_read, spread
 
 _FALSE_PER_S = 1e-3
 """False touches in free motion, at most so often."""
@@ -146,7 +146,8 @@ def noise_gain(sample_rate_hz: float, cutoff_hz: float) -> float:
 def white_noise_std(values: np.ndarray) -> float:
     """Standard deviation of white noise an axis in (n, k) samples, from second differences (robust to
     presses); of the axes that are read."""
-    columns = read_columns(np.atleast_2d(values.T).T)
+    values = np.atleast_2d(values.T).T
+    columns = values[:, are_read(values)]
     if not columns.size:
         return 0.0
     second = np.diff(columns, n=2, axis=0)
