@@ -55,7 +55,7 @@ def integrate(start, y, far, radius, bend, e_dent, e_far, nu, table, tool_compli
                 d[0] = -y[i, 0]
                 d[1] = anchor1 - y[i, 1]
                 d[2] = anchor2 - y[i, 2]
-                fn, fu, fv, dent, a, du, dv, _k = touch_solve(
+                fn, fu, fv, dent, a, du, dv, _, held = touch_solve(
                     state, d, compliance, table, radius[p], bend[p], plane_strain, stick
                 )
                 if dent > 0.0:
@@ -66,7 +66,7 @@ def integrate(start, y, far, radius, bend, e_dent, e_far, nu, table, tool_compli
                     fu *= kept
                     fv *= kept
                     break
-                both = 1.0 / (stick * a) + 0.5 * (compliance[1, 1] + compliance[2, 2])
+                both = 1.0 / held + 0.5 * (compliance[1, 1] + compliance[2, 2])
                 length = slip_length(slip, excess, before, length, both, 1.0)
                 before = excess
                 anchor1 += length * fu / pull

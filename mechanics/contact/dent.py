@@ -4,7 +4,7 @@ Every law is a table over x = delta / R of four numbers, with E* = E / (1 - nu^2
     normal force        E* R^2 c(x) (1 + k R g(x)) x^1.5    (k: mean curvature of the surface)
     contact radius      R alpha(x) x^0.5
     sideways stiffness  8 G / (2 - nu) R tau(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) where tau =
-    alpha)
+    alpha; tau / alpha is what the strain of a deep dent makes every ring of the contact stiffer by)
 Hertz is c = 4/3, alpha = tau = 1, g = 0. A tip that slips is pushed back less, the deeper the more: c falls
 with Coulomb's friction (`slipping`). On a curved surface R is the effective radius, which is Hertz's
 answer for a small contact; g is what a deep one on a bump or in a hollow has beyond it. One numba kernel
@@ -185,10 +185,10 @@ _LAWS: dict[str, Callable[[float], tuple[np.ndarray, str]]] = {
 
 @kernel
 def dent_force(table, depth, radius, bend, plane_strain_modulus):
-    """(force N, stiffness N/m, stick radius R tau x^0.5 m) at an indentation, m; zeros where it is not
-    positive. radius: effective, m. bend: mean curvature of the surface times the tip's radius."""
+    """(force N, stiffness N/m, contact radius R alpha x^0.5 m, tau / alpha) at an indentation, m; zeros where
+    it is not positive. radius: effective, m. bend: mean curvature of the surface times the tip's radius."""
     if not depth > 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0
     x = depth / radius
     last = table.shape[0] - 1
     step = DEPTH_LIMIT / last
@@ -196,25 +196,26 @@ def dent_force(table, depth, radius, bend, plane_strain_modulus):
     i = int(position)
     slope = 0.0
     if i >= last:
-        c, tau = table[last, 0] * (1.0 + bend * table[last, 3]), table[last, 2]
+        c, alpha, tau = table[last, 0] * (1.0 + bend * table[last, 3]), table[last, 1], table[last, 2]
     else:
         f = position - i
         low = table[i, 0] * (1.0 + bend * table[i, 3])
         high = table[i + 1, 0] * (1.0 + bend * table[i + 1, 3])
         slope = (high - low) / step
         c = low + f * (high - low)
+        alpha = table[i, 1] + f * (table[i + 1, 1] - table[i, 1])
         tau = table[i, 2] + f * (table[i + 1, 2] - table[i, 2])
     root = np.sqrt(x)
     force = plane_strain_modulus * radius * radius * c * x * root
     stiffness = plane_strain_modulus * radius * (1.5 * c * root + slope * x * root)
-    return force, stiffness, radius * tau * root
+    return force, stiffness, radius * alpha * root, tau / alpha
 
 
 @kernel
 def _dent_forces(table, depth, radius, plane_strain_modulus, force):
     """`dent_force` of indentations (k,) of a plane, into force (k,) N."""
     for i in range(len(depth)):
-        force[i], _, _ = dent_force(table, depth[i], radius, 0.0, plane_strain_modulus)
+        force[i], _, _, _ = dent_force(table, depth[i], radius, 0.0, plane_strain_modulus)
 
 
 def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> float | np.ndarray:

@@ -110,16 +110,16 @@ def touch_remember(state, dent, a, du, dv, radius):
 
 @kernel
 def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick):
-    """Force at displacement d without writing the memory: (f_n, f_u, f_v, dent, a, d_u, d_v, k_n).
+    """Force at displacement d without writing the memory: (f_n, f_u, f_v, dent, a, d_u, d_v, k_n, k_t).
 
-    Arguments as for touch_step. f: N on the tool, local frame. dent: m. a: stick radius, m. d_u, d_v:
-    tangential dent, m. k_n: slope of the normal force against pressing deeper, N/m. `touch_remember` takes
-    what it needs.
+    Arguments as for touch_step. f: N on the tool, local frame. dent: m. a: contact radius, m. d_u, d_v:
+    tangential dent, m. k_n: slope of the normal force against pressing deeper, N/m. k_t: stiffness of the
+    stick, N/m. `touch_remember` takes what it needs.
     """
     press = -d[0]
     # what is held may bend towards the tip, whose plane it then meets later
     if not (press > 0.0 or state[1] > 0.0):
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     cnn, cuu, cuv, cvv = far[0, 0], far[1, 1], far[1, 2], far[2, 2]
     # no dent is deeper than what a stiffening support (1 / (1 - STIFFEST)) makes of the whole displacement:
     # a tip that is dragged far while it sticks must not run away
@@ -130,23 +130,25 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
     minor = cuu * cvv - cuv * cuv
     within = cvv * far[1, 0] ** 2 - 2.0 * cuv * far[1, 0] * far[2, 0] + cuu * far[2, 0] ** 2
     sound = cuu > 0.0 and minor > 0.0 and cnn * minor >= within
-    fn = fu = fv = a = du = dv = stiffness = compliance = 0.0
+    fn = fu = fv = a = held = du = dv = stiffness = compliance = 0.0
     last_dent = last_excess = 0.0
     for turn in range(80):
-        fn, stiffness, a = dent_force(table, dent, radius, bend, plane_strain_modulus)
+        fn, stiffness, a, grip = dent_force(table, dent, radius, bend, plane_strain_modulus)
         # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
         # that
         compliance = max(cnn, -STIFFEST / stiffness)
         # near an edge the coupling may exceed what keeps the joint compliance positive definite
         cun, cvn = far[1, 0], far[2, 0]
         couple = cun * cun + cvn * cvn
-        held = stick * a
+        held = stick * grip * a
         least = (1.0 / stiffness + compliance) * (1.0 / held + max(min(cuu, cvv), -STIFFEST / held))
         if couple > STIFFEST * least and not sound:
             cun *= np.sqrt(STIFFEST * least / couple)
             cvn *= np.sqrt(STIFFEST * least / couple)
         # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
-        fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[1] + cun * fn, d[2] + cvn * fn)
+        fu, fv, du, dv = _tangential(
+            state, a, stick * grip, cuu, cuv, cvv, d[1] + cun * fn, d[2] + cvn * fn
+        )
         excess = dent + compliance * fn - cun * fu - cvn * fv - press
         if excess > 0.0:
             high = dent
@@ -162,11 +164,11 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
         if abs(step) < tolerance:
             break
         if not (press > 0.0 or high > tolerance):
-            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         dent += step
         if not (low < dent < high):
             dent = 0.5 * (low + high)
-    return fn, -fu, -fv, dent, a, du, dv, stiffness / (1.0 + compliance * stiffness)
+    return fn, -fu, -fv, dent, a, du, dv, stiffness / (1.0 + compliance * stiffness), held
 
 
 @kernel
@@ -179,7 +181,7 @@ def touch_step(state, d, far, table, radius, bend, plane_strain_modulus, stick):
     m. bend: mean curvature times the tip's radius (mechanics.contact.dent.bend_of).
     plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
     """
-    fn, fu, fv, dent, a, du, dv, _ = touch_solve(
+    fn, fu, fv, dent, a, du, dv, _, _ = touch_solve(
         state, d, far, table, radius, bend, plane_strain_modulus, stick
     )
     touch_remember(state, dent, a, du, dv, radius)

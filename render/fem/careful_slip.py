@@ -92,13 +92,13 @@ def felt_here(p, state, tips, i):
         d[k] += state.carried[k, i]
     for r in range(3):
         local[r] = frame[r, 0] * d[0] + frame[r, 1] * d[1] + frame[r, 2] * d[2]
-    fn, fu, fv, dent, a, du, dv, tangent = touch_solve(
+    fn, fu, fv, dent, a, du, dv, tangent, held = touch_solve(
         memory, local, state.local_far[i], p.table, state.radius[i], state.bend[i], plane_strain, stick
     )
     if dent > 0.0:
         memory[1] = dent  # where the next solution starts from
     trial[0], trial[1], trial[2], trial[3] = fn, fu, fv, dent
-    trial[4], trial[5], trial[6], trial[7], trial[8] = a, du, dv, tangent, stick * a
+    trial[4], trial[5], trial[6], trial[7], trial[8] = a, du, dv, tangent, held
 
 
 @part
