@@ -146,9 +146,7 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
             cun *= np.sqrt(STIFFEST * least / couple)
             cvn *= np.sqrt(STIFFEST * least / couple)
         # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
-        fu, fv, du, dv = _tangential(
-            state, a, stick * grip, cuu, cuv, cvv, d[1] + cun * fn, d[2] + cvn * fn
-        )
+        fu, fv, du, dv = _tangential(state, a, stick * grip, cuu, cuv, cvv, d[1] + cun * fn, d[2] + cvn * fn)
         excess = dent + compliance * fn - cun * fu - cvn * fv - press
         if excess > 0.0:
             high = dent

@@ -49,7 +49,8 @@ def test_give_of_the_object_adds_to_the_dent():
 @pytest.mark.parametrize("slope, known", [(0.1, (0.7238, 0.7421, 0.7588)), (0.35, (0.7497, 0.7632, 0.7815))])
 def test_the_deeper_an_oblique_press_the_more_it_is_pushed_back_sideways(slope, known):
     """Sideways over normal force and slope at 2, 3 and 5 mm: the virtual laboratory's block, 105 mm wide and
-    47 high, finest element 1.3 mm. Rings that hold stiffen as the dent deepens: without that 4 to 7 % less."""
+    47 high, finest element 1.3 mm. Rings that hold stiffen as the dent deepens: without that 4 to 7 % less.
+    """
     depth = np.linspace(0, 8e-3, 401)
     far = np.array([[2.52, 0.03, -0.26], [0.03, 2.52, -0.32], [-0.26, -0.32, -7.59]])
     d = np.column_stack([slope * depth, 0 * depth, -depth])
