@@ -15,7 +15,12 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
 from palpate.mechanics.compliance.near_field import contact_width
 from palpate.mechanics.compliance.patch import usual_width
-from palpate.mechanics.compliance.sites import contact_curvature, uneven_curvature
+from palpate.mechanics.compliance.sites import (
+    PATCH_WIDTH_IN_EDGES,
+    contact_curvature,
+    surface_edge,
+    uneven_curvature,
+)
 from palpate.mechanics.contact.edges import ends_within, nearness
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
@@ -163,10 +168,11 @@ def _through(model: Model, points: np.ndarray, normals: np.ndarray, tip_radius_m
 
 
 def _coarsely(renderer: FemRenderer, points: np.ndarray, tip_radius_m: float) -> np.ndarray:
-    """(k,) rims within a patch's reach, times the tip's radius over the patch's width; none where it is the
-    usual one, which rims are made up for on (mechanics.contact.edges)."""
+    """(k,) rims within a patch's reach, times the tip's radius over the patch's width; none where elements are
+    as fine as touches ask for: there rims are made up for (mechanics.contact.edges)."""
     mesh, width = renderer.model.mesh, float(renderer.compliance.own_width_m[0])
-    excess = max(0.0, 1 - usual_width(mesh) / width)
+    asked = max(usual_width(mesh), PATCH_WIDTH_IN_EDGES * surface_edge(mesh))
+    excess = max(0.0, 1 - asked / width)
     return (
         excess * tip_radius_m / width * ends_within(mesh, points, width) if excess else np.zeros(len(points))
     )
