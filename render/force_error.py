@@ -168,8 +168,8 @@ def _through(model: Model, points: np.ndarray, normals: np.ndarray, tip_radius_m
 
 
 def _coarsely(renderer: FemRenderer, points: np.ndarray, tip_radius_m: float) -> np.ndarray:
-    """(k,) rims within a patch's reach, times the tip's radius over the patch's width; none where elements are
-    as fine as touches ask for: there rims are made up for (mechanics.contact.edges)."""
+    """(k,) rims within a patch's reach, times the tip's radius over the patch's width; none where elements
+    are as fine as touches ask for: there rims are made up for (mechanics.contact.edges)."""
     mesh, width = renderer.model.mesh, float(renderer.compliance.own_width_m[0])
     asked = max(usual_width(mesh), PATCH_WIDTH_IN_EDGES * surface_edge(mesh))
     excess = max(0.0, 1 - asked / width)
