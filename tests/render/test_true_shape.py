@@ -16,7 +16,9 @@ from palpate.mechanics.shape.nearest import neighbours, sample
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.fem.fine_surface import FineSurface
+from palpate.render.options import RenderOptions
 from palpate.render.surface.contact_surface import contact_surface
+from palpate.render.surface.snapping import touched_surface
 
 from . import shapes
 
@@ -89,6 +91,22 @@ def test_a_sharp_rim_stays_where_it_is_and_only_beside_it_the_normal_turns():
         assert n[top & (inwards > 2.05e-3), 2].min() > 1 - 1e-9
         rim = top & (inwards < 1e-5)
         assert n[rim, 2] == pytest.approx(np.full(rim.sum(), np.sqrt(0.5)), abs=0.03)
+
+
+def test_beside_a_rim_a_small_tip_feels_the_face_and_not_the_rim():
+    """The normal turned over 2 mm whatever the tip: 0.7 mm beside a rim 1 mm felt half of the force."""
+    shape = turned_on_a_lathe(np.array([[RADIUS, 0.0], [RADIUS, HEIGHT]]))
+    model = shapes.model(meshed(shape, (9, 7)))
+    straight = []
+    for tip in (0.005, 0.001):
+        made = dataclasses.replace(model, tool=dataclasses.replace(model.tool, tip_radius_m=tip))
+        arrays = touched_surface(made, RenderOptions()).arrays
+        used = np.unique(arrays.triangles[arrays.free > 0])
+        v, n = arrays.vertices[used], arrays.normals[used]
+        top = np.abs(v[:, 2] - HEIGHT) < 1e-6
+        turned = top & (n[:, 2] < 1 - 1e-6)
+        straight.append((RADIUS - np.hypot(v[turned, 0], v[turned, 1])).max())
+    assert straight[0] > 0.0015 and straight[1] < 0.0005
 
 
 def test_a_crease_that_fades_leaves_no_triangle_without_area_and_no_normal_without_length():
