@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 import palpate as pp
 from palpate.mechanics.errors import PalpateError
-from palpate.mechanics.model.model import Model
+from palpate.mechanics.model.model import Model, Tool
 from palpate.mechanics.shape.nearest import farthest_apart, first_hits, sample
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.base import Renderer
@@ -88,9 +88,9 @@ def _to_others(shape: TrueShape, points: np.ndarray, normals: np.ndarray) -> np.
     return away.min(axis=1) if len(points) else np.zeros(0)
 
 
-def renderer_of(model: Model) -> Renderer:
-    """One that solves the places that it comes to, as `palpate press` does."""
-    return create("fem", model, on_demand=True)
+def renderer_of(model: Model, tip_m: float) -> Renderer:
+    """One for that tip that solves the places that it comes to, as `palpate press --tip-radius` does."""
+    return create("fem", replace(model, tool=Tool(tip_m)), on_demand=True)
 
 
 def pressed(
@@ -128,7 +128,7 @@ def compare(models: list[Model], count: int, solved: int) -> dict[str, Any]:
     """What presses say on models of one shape, the first of the default size. solved: places of it that are
     solved too."""
     places = places_of(models[0], count)
-    renderers = [renderer_of(model) for model in models]
+    renderers = [renderer_of(model, places.tip_m) for model in models]
     forces = np.full((len(models), len(places.points)), np.nan)
     bound, said, hertz, exact, unsettled = [], [], [], [], 0
     for k in range(len(places.points)):

@@ -2,9 +2,9 @@
 
 Each of 60 files is given to `pp.model_of` as somebody would who never saw it; where that is refused, what the
 refusal names is taken, twice at most. The model's volume is held against the object's; then it is made once
-more with tetrahedra of half the size (nearly, where that takes too much work), and both are pressed at the
-same places (benchmarks._zoo_presses): against one another, against Hertz where that applies, and against the
-solver of a press.
+more with tetrahedra of half the size (nearly, and not at all where that takes too much work), and both are
+pressed at the same places (benchmarks._zoo_presses): against one another, against Hertz where that applies,
+and against the solver of a press.
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ from palpate.mechanics.model.model import Model
 
 ZOO: dict[str, Callable[[], Drawn]] = {**ORGANS, **PHANTOMS, **PARTS, **SCANS, **BROKEN}
 _VOLUME, _SIZES, _HERTZ, _CURES = 0.05, 0.02, 0.05, 2
-_MOST = 20_000
-"""Tetrahedra of the second mesh; where the first has nearly as many, a coarser one is taken."""
+_MOST, _FINER = 20_000, 0.8
+"""Tetrahedra of the second mesh; where so many leave its size above this share of the first's, no second one
+is made: a coarser one would be judged in its place."""
 OUTCOMES = (
     "right",
     "right by the cure that was named",
@@ -96,7 +97,8 @@ def tried(drawn: Drawn, folder: Path, sizes: int = 2, places: int = 8, solved: i
     try:
         model = _modelled(path, drawn, found)
         if model is not None:
-            models = [model, *[_other(path, found["given"], model)] * (sizes - 1)]
+            finer = _finer(path, found["given"], model) if sizes > 1 else None
+            models = [model] if finer is None else [model, finer]
             found |= {"sizes_mm": [1e3 * each.mesh_size_m for each in models]}
             found |= {"volume_ratio": _volume_ratio(drawn, model, found["given"])}
             if places:
@@ -143,13 +145,14 @@ def _cure(said: str) -> dict[str, Any] | None:
     return {name: kind(value.rstrip(".,"))}
 
 
-def _other(path: Path, given: dict[str, Any], model: Model) -> Model:
+def _finer(path: Path, given: dict[str, Any], model: Model) -> Model | None:
     """The same at half the size of tetrahedra, or as near to half as _MOST of them allow."""
     ratio = max(0.5, (len(model.mesh.tetrahedra) / _MOST) ** (1 / 3))
+    if ratio > _FINER:
+        return None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        size = model.mesh_size_m * (ratio if ratio < 0.8 else 1.4)
-        return pp.model_of(path, **given | {"mesh_size_m": size})
+        return pp.model_of(path, **given | {"mesh_size_m": model.mesh_size_m * ratio})
 
 
 def _volume_ratio(drawn: Drawn, model: Model, given: dict[str, Any]) -> float | None:
@@ -198,6 +201,7 @@ def _line(name: str, one: dict[str, Any]) -> str:
         words.append(f"volume {one['volume_ratio']:.3f}")
     if "places" in one:
         words.append(f"{one['pressed']} of {one['places']} places")
+        words += ["no finer mesh"] * (len(one["sizes_mm"]) == 1)
         for key, shift in (("between_sizes", 0), ("over_hertz", 1)):
             if one[key]:
                 worst = max((x - shift for x in one[key]), key=abs)
@@ -221,11 +225,14 @@ def _figures(shapes: dict[str, dict[str, Any]]) -> list[Figure]:
         return np.array([x for one in shapes.values() for x in one.get(key, [])], dtype=float)
 
     sizes, hertz, solver = gathered("between_sizes"), gathered("over_hertz") - 1, gathered("over_solver")
+    meshed = [one for one in shapes.values() if "sizes_mm" in one]
+    alone = sum(len(one["sizes_mm"]) == 1 for one in meshed)
+    figures.append(Figure(f"shapes without a finer mesh to hold them against, of {len(meshed)}", alone))
     if len(sizes):
         within = float((np.abs(sizes) <= _SIZES).mean())
         what = f"forces of two mesh sizes within 2 % of each other, of {len(sizes)}"
         figures.append(Figure(what, within).at_least(1.0))
-        figures.append(_spread("force of one mesh size over the other's, less 1", sizes))
+        figures.append(_spread("force on the finer mesh over that on the first, less 1", sizes))
     if len(hertz):
         figures.append(_spread(f"force over Hertz's, less 1, at {len(hertz)} places", hertz))
     if len(solver):

@@ -254,6 +254,12 @@ class Bound:
         "set by two places of `palpate bench mesh-zoo`: the law is 33 % too hard on a shell of 4 mm, 13 % on "
         "a tube of 5 mm, with tips of 4.8 mm",
     )  # fmt: skip
+    coarse = OwnError(
+        1.4, "1", "95 %: rims within a patch wider than the usual one, over its width in tip radii, times "
+        "the root of the depth", "place",
+        "set by three places of `palpate bench mesh-zoo` beside rims of a block of 500 mm, whose elements of "
+        "38 mm are too many to halve: the law is 4 to 23 % too hard",
+    )  # fmt: skip
     sideways = OwnError(0.1, "1", "95 %: the surface's way sideways under a push", "place", _BOUND)
     rim = OwnError(0.2, "1", "95 %: how near a rim is", "place", _BOUND)
     base = OwnError(0.6, "1", "95 %: how near the base is", "place", _BOUND)

@@ -14,8 +14,14 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
 from palpate.mechanics.compliance.near_field import contact_width
-from palpate.mechanics.compliance.sites import contact_curvature, uneven_curvature
-from palpate.mechanics.contact.edges import nearness
+from palpate.mechanics.compliance.patch import usual_width
+from palpate.mechanics.compliance.sites import (
+    PATCH_WIDTH_IN_EDGES,
+    contact_curvature,
+    surface_edge,
+    uneven_curvature,
+)
+from palpate.mechanics.contact.edges import ends_within, nearness
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
 from palpate.mechanics.model.model import Model
@@ -120,10 +126,11 @@ def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOpti
 def place_numbers(
     renderer: FemRenderer, tip_radius_m: float, vertices: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
-    """(6, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
+    """(7, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
     radius; how far a push along the normal moves the surface sideways (`way_aside`); how near a rim and how
     near the base it is (mechanics.contact.edges.nearness); `uneven_curvature` times the tip's radius; how
-    wide a contact is beside a wall (`_through`)."""
+    wide a contact is beside a wall (`_through`); how much of a patch that is too wide reaches over rims
+    (`_coarsely`)."""
     surface, mesh, parameters = renderer.contact.arrays, renderer.model.mesh, renderer.parameters
     points, normals, far = surface.vertices[vertices], surface.normals[vertices], renderer.far_at(vertices)
     along = np.einsum("vab,vb->va", far, normals)
@@ -133,7 +140,9 @@ def place_numbers(
     rim, base = nearness(mesh, points, normals)
     uneven = uneven_curvature(mesh, points, normals, tip_radius_m) * tip_radius_m
     wall = _through(renderer.model, points, normals, tip_radius_m)
-    return np.stack([bent * tip_radius_m, way_aside(give, sideways, tip_radius_m), rim, base, uneven, wall])
+    coarse = _coarsely(renderer, points, tip_radius_m)
+    aside = way_aside(give, sideways, tip_radius_m)
+    return np.stack([bent * tip_radius_m, aside, rim, base, uneven, wall, coarse])
 
 
 def thickness_under(
@@ -158,6 +167,17 @@ def _through(model: Model, points: np.ndarray, normals: np.ndarray, tip_radius_m
     return np.where(free, np.square(width / np.where(free, thick, 1.0)), 0.0)
 
 
+def _coarsely(renderer: FemRenderer, points: np.ndarray, tip_radius_m: float) -> np.ndarray:
+    """(k,) rims within a patch's reach, times the tip's radius over the patch's width; none where elements
+    are as fine as touches ask for: there rims are made up for (mechanics.contact.edges)."""
+    mesh, width = renderer.model.mesh, float(renderer.compliance.own_width_m[0])
+    asked = max(usual_width(mesh), PATCH_WIDTH_IN_EDGES * surface_edge(mesh))
+    excess = max(0.0, 1 - asked / width)
+    return (
+        excess * tip_radius_m / width * ends_within(mesh, points, width) if excess else np.zeros(len(points))
+    )
+
+
 def way_aside(give: np.ndarray, sideways: np.ndarray, tip_radius_m: float | np.ndarray) -> np.ndarray:
     """(k,) how far a push moves the surface sideways beside what gives way to it: about the dent on a compact
     object, the object itself where it bends, which is solved as such.
@@ -168,7 +188,7 @@ def way_aside(give: np.ndarray, sideways: np.ndarray, tip_radius_m: float | np.n
 
 
 def rendered_share(renderer: FemRenderer, depth: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (6, ...), place_numbers."""
+    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (7, ...), place_numbers."""
     given = renderer.parameters
     nu, mu = float(given.poisson_ratio[0]), float(given.friction[0])
     return law_share(depth, *numbers, poisson_ratio=nu, friction=mu)
@@ -182,11 +202,12 @@ def law_share(
     base: np.ndarray,
     uneven: np.ndarray | float = 0.0,
     wall: np.ndarray | float = 0.0,
+    coarse: np.ndarray | float = 0.0,
     *,
     poisson_ratio: float = USUAL_POISSON_RATIO,
     friction: float = np.inf,
 ) -> np.ndarray:
-    """Half width of the law's 95 % interval over the force; depth in tip radii, the next six: place_numbers;
+    """Half width of the law's 95 % interval over the force; depth in tip radii, then seven place_numbers;
     friction: Coulomb's coefficient."""
     terms = (
         Bound.floor.value,
@@ -197,6 +218,7 @@ def law_share(
         Bound.base.value * base,
         Bound.uneven.value * uneven,
         Bound.wall.value * wall,
+        Bound.coarse.value * coarse * np.sqrt(depth),
         Bound.ratio.value * max(USUAL_POISSON_RATIO - poisson_ratio, 0.0),
         Bound.slip.value * np.exp(-friction / Bound.slippery.value) * depth,
     )

@@ -29,7 +29,7 @@ import scipy.sparse as sp
 from palpate.mechanics.compliance.far_field import EnergyFields, energy_fields, far_with_weights
 from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance
 from palpate.mechanics.compliance.pressed_places import Places
-from palpate.mechanics.compliance.sites import SURFACE_EDGE_M, patch_loads, patch_width
+from palpate.mechanics.compliance.sites import patch_loads, patch_width, surface_edge
 from palpate.mechanics.compliance.smooth_field import TIP_DEPTH_IN_RADII, Shares
 from palpate.mechanics.elastic.elasticity import element_stiffness
 from palpate.mechanics.elastic.solver import Solver
@@ -132,7 +132,7 @@ def solve_field(places: Places, log_ratio: np.ndarray) -> SolvedField:
     """The places' energies with the field in the elements: one factorisation, three solutions a place."""
     model = places.model
     nu, coarse = model.material.poisson_ratio, model.mesh.quadratic()
-    fine, parent = refined_near_surface(coarse, SURFACE_EDGE_M)
+    fine, parent = refined_near_surface(coarse, surface_edge(coarse))
     mesh = fine.quadratic()
     ratio = np.exp(log_ratio)[parent]
     width = patch_width(mesh)

@@ -17,10 +17,10 @@ from palpate.mechanics.compliance.compression import own_blocks
 from palpate.mechanics.compliance.near_field import ball_law
 from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance, triangle_shapes
 from palpate.mechanics.compliance.sites import (
-    SURFACE_EDGE_M,
     load_width,
     patch_width,
     shape_under_one_patch,
+    surface_edge,
     touch_solver,
 )
 from palpate.mechanics.elastic.floor import carried_by_floor
@@ -107,7 +107,7 @@ def fine_corners(
 
 def is_fine(mesh: TetMesh, balls: Sequence[Ball], hold: BaseHold | None) -> bool:
     """Whether a mesh serves as it is."""
-    return typical_edge(mesh) <= SURFACE_EDGE_M and not balls and not is_loose(hold)
+    return typical_edge(mesh) <= surface_edge(mesh) and not balls and not is_loose(hold)
 
 
 def is_loose(hold: BaseHold | None) -> bool:

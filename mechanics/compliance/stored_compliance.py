@@ -45,7 +45,7 @@ def compliance_key(model: Model, *, dense: bool = False) -> str:
     balls = tuple(material.inclusions.values())
     error = None if dense else low_rank_error(model.mesh)
     return content_key(
-        "surface compliance 8",
+        "surface compliance 9",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,
@@ -150,7 +150,7 @@ def kept_places(model: Model) -> OnDemandCompliance | None:
 
 
 def _places_of(model: Model) -> tuple[str, Path | None]:
-    key = content_key("solved places 3", compliance_key(model, dense=True))
+    key = content_key("solved places 4", compliance_key(model, dense=True))
     return key, None if model.path is None else model.path / f"places-{key[:16]}.bin"
 
 

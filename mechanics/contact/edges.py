@@ -79,6 +79,13 @@ def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np
     return near[:, np.argmin(over_base)], near[:, np.argmax(over_base)]
 
 
+def ends_within(mesh: TetMesh, points: np.ndarray, width_m: float) -> np.ndarray:
+    """(k,) how many rims come within a patch of that width, m, of places (k, 3), by one Gaussian: 1 on
+    a straight rim of a right angle, 3 on a block's corner, 0 far away."""
+    samples, length = _rims(mesh, _STEP * width_m)
+    return _summed(points, samples, length / (np.sqrt(2 * np.pi) * width_m), width_m)
+
+
 def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(k, g) what each Gaussian comes to at places (k, 3): 1 on a straight rim that turns by a right angle,
     and, but for the cube of the cosine, on a plane base."""

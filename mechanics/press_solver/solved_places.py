@@ -81,7 +81,7 @@ class SolvedPresses:
     ) -> None:
         self.tip_radius_m = float(tip_radius_m)
         self._content = (
-            "solved place 3", mesh.points, mesh.tetrahedra, mesh.fixed, *surface, ratio, poisson_ratio,
+            "solved place 4", mesh.points, mesh.tetrahedra, mesh.fixed, *surface, ratio, poisson_ratio,
             tip_radius_m, repr(options),
         )  # fmt: skip
         self.solver = PressSolver(

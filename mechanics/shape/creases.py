@@ -19,6 +19,9 @@ _PLANE_BEND = 0.5
 _PLANE_TURN = 2e-4  # rad, what the rounding of a file's coordinates turns
 _WIDER = 2.5
 """A face so many times as wide as its neighbour, across their edge, is plane up to it."""
+_APEX_TURNS = 2.0
+"""A corner that looks away from its triangle by so many times what the surface turns over the edges there,
+and lifts it by more than _CREASE_SAG_M, is the tip of a cone: on a round surface the two are about alike."""
 _FEW = 8  # triangles of a face up to which all its corners are looked at
 
 
@@ -118,4 +121,10 @@ def corner_normals_of(vertices: np.ndarray, triangles: np.ndarray, facets: Facet
     normals = (total / np.maximum(length, 1e-300))[group]
     lost = ~(length[group, 0] > 0)
     normals[lost] = np.repeat(facets.unit, 3, axis=0)[lost]
-    return normals.reshape(m, 3, 3)
+    normals = normals.reshape(m, 3, 3)
+    # a cone's triangles meet at its tip, and bulge if that looks one way for all of them
+    turn = np.zeros(group.max() + 1)
+    np.maximum.at(turn, group[r], angle_between(facets.unit[r // 3], facets.unit[c // 3]))
+    tip = angle_between(normals, facets.unit[:, None]) > _APEX_TURNS * turn[group].reshape(m, 3)
+    lift = np.maximum(*(np.abs(np.einsum("mcx,mcx->mc", side, normals)) for side in (after, before)))
+    return np.where((tip & (lift / 4 > _CREASE_SAG_M))[..., None], facets.unit[:, None], normals)

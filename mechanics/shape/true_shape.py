@@ -2,7 +2,8 @@
 
 Cubic patches (PN triangles: Vlachos et al., Curved PN Triangles, 2001) stand on the file's triangles. Their
 corner normals are weighted so that they are exact on a sphere and on a cylinder (Max, Weights for computing
-vertex normals, 1999). Plane faces stay plane where a fillet begins, and creases stay where they are.
+vertex normals, 1999). Between them normals are quadratic, the same on both sides of an edge. Plane faces
+stay plane where a fillet begins, and creases stay where they are.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ class TrueShape:
     @cached_property
     def key(self) -> str:
         """Hash of its content."""
-        return content_key("true shape 1", self.vertices, self.triangles)
+        return content_key("true shape 2", self.vertices, self.triangles)
 
     @cached_property
     def corner_normals(self) -> np.ndarray:
@@ -94,7 +95,9 @@ class TrueShape:
     def on(self, triangle: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""
         points = np.einsum("kb,kbx->kx", _bernstein(weights), self._control[triangle])
-        normals = np.einsum("kc,kcx->kx", weights, self.corner_normals[triangle])
+        u, v, w = weights.T
+        shares = np.stack([u * u, v * v, w * w, 2 * u * v, 2 * v * w, 2 * w * u], axis=1)
+        normals = np.einsum("kb,kbx->kx", shares, self._facing_at[triangle])
         # corners that look opposite ways, at the end of a crease, leave their triangle's own
         return points, unit_vectors(normals, self._facets.unit[triangle])
 
@@ -168,6 +171,21 @@ class TrueShape:
     @cached_property
     def _control(self) -> np.ndarray:
         return _control(self.vertices, self.triangles, self.corner_normals, self._facets)
+
+    @cached_property
+    def _facing_at(self) -> np.ndarray:
+        """(m, 6, 3) normals that `on` weighs by quadratics: at the corners, then of the edges' middles.
+
+        A middle's is the corners' mean as mirrored across the edge (Vlachos et al.): where both corners look
+        along an edge that bends one way and back, the surface between them looks the other way.
+        """
+        corners = self.corner_normals
+        edge = np.roll(self.vertices[self.triangles], -1, axis=1) - self.vertices[self.triangles]
+        both = corners + np.roll(corners, -1, axis=1)
+        square = np.maximum((edge**2).sum(axis=2, keepdims=True), 1e-300)
+        both = both - 2 * (both * edge).sum(axis=2, keepdims=True) / square * edge
+        instead = np.repeat(self._facets.unit, 3, axis=0)
+        return np.concatenate([corners, unit_vectors(both.reshape(-1, 3), instead).reshape(-1, 3, 3)], axis=1)
 
     @cached_property
     def _bends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, cKDTree]:

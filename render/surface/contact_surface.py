@@ -26,6 +26,7 @@ from palpate.render.surface.shaped import (
     EASED_AGREEMENT,
     EDGE_ROUNDING_M,
     NORMAL_SMOOTHING_M,
+    RIM_STRIP_M,
     Feet,
     halved_where_bent,
     on_shape,
@@ -90,10 +91,11 @@ class ContactSurface:
 LARGEST = 60_000
 
 
-def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3) -> ContactSurface:
+def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, strip_m: float = RIM_STRIP_M) -> ContactSurface:
     """Round and refine a mesh's boundary to about `edge_m`, with at most about LARGEST triangles.
 
-    Where the mesh's shape is known every vertex is put onto it, and edges are halved where it bends.
+    Where the mesh's shape is known every vertex is put onto it, and edges are halved where it bends; the
+    contact normal turns within strip_m of its sharp rims.
     Raises MeshError where the boundary is not closed.
     """
     shape = mesh.shape
@@ -122,7 +124,7 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3) -> ContactSurface:
             feet, vertices, triangles, free, parent_weights, LARGEST
         )
         free, parents = free[within], parents[within]
-        placed = on_shape(feet, vertices, triangles, free, parent_weights)
+        placed = on_shape(feet, vertices, triangles, free, parent_weights, strip_m)
         vertices, triangles, parent_weights = placed.vertices, placed.triangles, placed.weights
         free, parents = free[placed.within], parents[placed.within]
     across = neighbours(triangles)

@@ -26,9 +26,10 @@ EDGE_ROUNDING_M, NORMAL_SMOOTHING_M = 2.2e-3, 2.5e-3
 slides by friction over a rim whose shape is not known stepped by 2.4 % of its force."""
 _HOLLOW_ROUNDING_M = 1.5e-3
 """The first of the concave creases of a known shape, whose sharp rims are not rounded."""
-RIM_STRIP_M = 2e-3
+RIM_STRIP_M, _STRIP_IN_RADII = 2e-3, 0.4
 """Width of the strip on either side of a sharp rim over which the contact normal turns. With 1.5 mm a ball of
-5 mm that slides over the rim without friction steps; with 2.5 mm places 2 mm beside it are 4 % too stiff."""
+5 mm that slides over the rim without friction steps; with 2.5 mm places 2 mm beside it are 4 % too stiff. A
+smaller tip's is as many of its radii: of 2 mm, a tip of 1 mm felt 0.7 mm beside a rim half of the force."""
 EASED_AGREEMENT = (0.99, 0.93)
 """Mean of the unit normals around a vertex above which nothing is eased, and below which all of it is."""
 _CREASE_SPACING_M = 1e-4
@@ -39,6 +40,11 @@ _ROUNDS, _HALVINGS = 4, 3
 _NO_AREA = 1e-5  # of a fine edge squared, twice the area of a triangle that has none
 _ALIKE = 0.8
 _MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
+
+
+def rim_strip(tip_radius_m: float) -> float:
+    """m, the strip's width for a tip."""
+    return min(RIM_STRIP_M, _STRIP_IN_RADII * tip_radius_m)
 
 
 class Feet:
@@ -113,7 +119,12 @@ class OnShape(NamedTuple):
 
 
 def on_shape(
-    feet: Feet, vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray, weights: np.ndarray
+    feet: Feet,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    free: np.ndarray,
+    weights: np.ndarray,
+    strip_m: float,
 ) -> OnShape:
     """Put a contact surface onto the shape: its vertices (v, 3) m and triangles (k, 3), cut beside rims.
 
@@ -142,9 +153,7 @@ def on_shape(
         return OnShape(placed, normals, triangles, np.arange(len(triangles)), weights)
     line = _line(shape, placed[sharp], placed[rim])
     before = len(placed)
-    placed, triangles, within, weights = cut_beside(
-        placed, triangles, free, weights, sharp, line, RIM_STRIP_M
-    )
+    placed, triangles, within, weights = cut_beside(placed, triangles, free, weights, sharp, line, strip_m)
     placed[before:], facing = shape.foot(placed[before:])
     normals = np.vstack([normals, facing])
     own = np.setdiff1d(triangles[free[within] > 0], rim)
@@ -152,10 +161,10 @@ def on_shape(
         own = own[~_beside(hollows, placed[own])]
     rims = np.flatnonzero(sharp)
     between = pseudonormals(placed, triangles)[rims]
-    away = line.query(placed[own], distance_upper_bound=RIM_STRIP_M)[0]
-    own, away = own[away < RIM_STRIP_M], away[away < RIM_STRIP_M]
+    away = line.query(placed[own], distance_upper_bound=strip_m)[0]
+    own, away = own[away < strip_m], away[away < strip_m]
     facing = between[cKDTree(placed[rims]).query(placed[own])[1]]
-    normals[own] = _towards(normals[own], facing, 1 - away / RIM_STRIP_M)
+    normals[own] = _towards(normals[own], facing, 1 - away / strip_m)
     return OnShape(placed, normals, triangles, within, weights)
 
 

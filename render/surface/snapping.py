@@ -27,6 +27,7 @@ from palpate.render.surface.contact_surface import (
     contact_surface,
     with_vertices,
 )
+from palpate.render.surface.shaped import rim_strip
 from palpate.render.surface.walking import place
 
 REACH_M = 0.012  # correlation length of shape errors: about a mesh edge
@@ -56,6 +57,7 @@ def _touched_surface(model: Model, edge_m: float, snap: bool) -> ContactSurface:
         mesh.touchable,
         "" if mesh.shape is None else f"a foot of its side {mesh.shape.key}",
         float(edge_m),
+        *([] if mesh.shape is None else [rim_strip(model.tool.tip_radius_m)]),
         *([model.presses.point, model.presses.normal, float(model.tool.tip_radius_m)] if drawn else []),
     )
     path = model.path / f"contact-{key[:16]}.bin"
@@ -63,7 +65,7 @@ def _touched_surface(model: Model, edge_m: float, snap: bool) -> ContactSurface:
 
 
 def _made(model: Model, edge_m: float, drawn: bool) -> ContactSurface:
-    surface = contact_surface(model.mesh, edge_m=edge_m)
+    surface = contact_surface(model.mesh, edge_m=edge_m, strip_m=rim_strip(model.tool.tip_radius_m))
     if not drawn:
         return surface
     feet, normals, gaps = touch_gaps(surface.arrays, model)

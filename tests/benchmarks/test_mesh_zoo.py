@@ -54,6 +54,14 @@ def test_a_stopped_run_goes_on_where_it_was(tmp_path, monkeypatch):
         run(arguments)
 
 
+@pytest.mark.parametrize("most, sizes", [(20_000, 2), (100, 1)])
+def test_a_mesh_is_held_against_a_finer_one_or_none(most, sizes, tmp_path, monkeypatch):
+    """Where half the size took too much work a coarser mesh was judged as the finer one."""
+    monkeypatch.setattr(mesh_zoo, "_MOST", most)
+    made = tried(ZOO["two blocks touching"](), tmp_path, places=0)["sizes_mm"]
+    assert len(made) == sizes and made[-1] <= made[0]
+
+
 def test_there_are_sixty():
     assert len(ZOO) == 60
 

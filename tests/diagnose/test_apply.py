@@ -13,7 +13,7 @@ import palpate.mechanics.compliance.fine_corners as made
 from palpate.diagnosis.apply import improvement, with_effects, with_replayed_modulus
 from palpate.mechanics.compliance.near_field import BallLaw, ball_law, surface_softness
 from palpate.mechanics.compliance.pressed_places import solve_places
-from palpate.mechanics.compliance.sites import SURFACE_EDGE_M, touch_solver
+from palpate.mechanics.compliance.sites import surface_edge, touch_solver
 from palpate.mechanics.compliance.surface_compliance import surface_compliance
 from palpate.mechanics.effects.inclusion import ball_of, first_order, solved_change
 from palpate.mechanics.effects.registry import effect
@@ -33,7 +33,7 @@ TOP = np.array([0.0, 0.0, 0.04])
 def coarse():
     """Compliances on the block's own mesh: what is asked here needs no finer one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(made, "SURFACE_EDGE_M", COARSE_M)
+        patch.setattr(made, "surface_edge", lambda _: COARSE_M)
         patch.setattr(made, "ball_law", lambda solver, points, *rest: BallLaw.none(len(points)))
         patch.setattr(made, "touch_solver", partial(touch_solver, surface_edge_m=COARSE_M))
         yield
@@ -216,7 +216,7 @@ def test_a_ball_lies_inside_the_object(model):
 def test_a_ball_that_is_fitted_changes_a_place_as_the_rendered_one_does(model):
     places, ball = at_top(model), Ball((0.0, 0.0, 0.024), 0.01, 6.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(made, "SURFACE_EDGE_M", SURFACE_EDGE_M)
+        patch.setattr(made, "surface_edge", surface_edge)
         patch.setattr(made, "ball_law", ball_law)
         patch.setattr(made, "touch_solver", touch_solver)
         plain, with_ball = (

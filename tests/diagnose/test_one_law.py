@@ -81,7 +81,7 @@ def model(bench):
 def compliance(model):
     """Of the block's own mesh: only its form is used."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(made, "SURFACE_EDGE_M", COARSE_M)
+        patch.setattr(made, "surface_edge", lambda _: COARSE_M)
         patch.setattr(made, "ball_law", lambda solver, points, *rest: BallLaw.none(len(points)))
         patch.setattr(made, "touch_solver", partial(touch_solver, surface_edge_m=COARSE_M))
         return load_or_condense(model)

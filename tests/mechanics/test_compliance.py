@@ -124,9 +124,7 @@ def test_low_rank_tables_serve_the_same_compliance(box):
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     solver = Solver(mesh.quadratic(), 0.45)
     width = float(made.own_width_m[0])
-    sites = touch_sites(
-        mesh, points, normals, 0.45, solver=solver, patch=LoadPatch(width), curvature=np.zeros(12)
-    )
+    sites = touch_sites(mesh, points, normals, 0.45, patch=LoadPatch(width), curvature=np.zeros(12))
     size = np.abs(made.own).max(axis=(0, 1, 2))
     assert np.abs(made.far_at(points, normals) - sites.far).max() < 0.04 * size
     dense = patch_blocks(solver, made.points[:40], float(made.patch_width_m[0]))

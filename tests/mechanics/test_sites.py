@@ -31,6 +31,22 @@ from .closed_forms import hertz_force
 UP = np.array([0.0, 0.0, 1.0])
 
 
+def test_a_small_object_gives_way_as_a_large_one_of_its_form(box):
+    """All lengths a tenth: the same but for the unit of length, as its elements are halved alike."""
+    far = []
+    for size in (0.05, 0.005):
+        mesh = box((5, 5, 5), (size, size, size))
+        places = size * np.array([[0.5, 0.0, 0.2], [0.2, 0.1, 1.0]])
+        facing = np.array([[1.0, 0.0, 0.0], UP])
+        far.append(
+            size
+            * touch_sites(
+                mesh, places, facing, 0.45, curvature=0.0, patch=LoadPatch(tip_radius_m=size / 10)
+            ).far
+        )
+    np.testing.assert_allclose(far[1], far[0], atol=0.01 * np.abs(far[0]).max())
+
+
 @pytest.mark.skipif(not available(), reason="large systems, slow without MKL")
 def test_hertz_on_a_large_block_whatever_the_mesh(box):
     """A sphere of 10 mm pressed 1 mm into a block of 400 mm on elements of 130, 80, 50 mm.

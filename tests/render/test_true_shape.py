@@ -16,7 +16,9 @@ from palpate.mechanics.shape.nearest import neighbours, sample
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.fem.fine_surface import FineSurface
+from palpate.render.options import RenderOptions
 from palpate.render.surface.contact_surface import contact_surface
+from palpate.render.surface.snapping import touched_surface
 
 from . import shapes
 
@@ -91,6 +93,22 @@ def test_a_sharp_rim_stays_where_it_is_and_only_beside_it_the_normal_turns():
         assert n[rim, 2] == pytest.approx(np.full(rim.sum(), np.sqrt(0.5)), abs=0.03)
 
 
+def test_beside_a_rim_a_small_tip_feels_the_face_and_not_the_rim():
+    """The normal turned over 2 mm whatever the tip: 0.7 mm beside a rim 1 mm felt half of the force."""
+    shape = turned_on_a_lathe(np.array([[RADIUS, 0.0], [RADIUS, HEIGHT]]))
+    model = shapes.model(meshed(shape, (9, 7)))
+    straight = []
+    for tip in (0.005, 0.001):
+        made = dataclasses.replace(model, tool=dataclasses.replace(model.tool, tip_radius_m=tip))
+        arrays = touched_surface(made, RenderOptions()).arrays
+        used = np.unique(arrays.triangles[arrays.free > 0])
+        v, n = arrays.vertices[used], arrays.normals[used]
+        top = np.abs(v[:, 2] - HEIGHT) < 1e-6
+        turned = top & (n[:, 2] < 1 - 1e-6)
+        straight.append((RADIUS - np.hypot(v[turned, 0], v[turned, 1])).max())
+    assert straight[0] > 0.0015 and straight[1] < 0.0005
+
+
 def test_a_crease_that_fades_leaves_no_triangle_without_area_and_no_normal_without_length():
     """A block with a roof on it: several fine vertices have the same end of its ridge as nearest crease."""
 
@@ -128,6 +146,44 @@ def test_a_direction_that_is_none_is_that_of_what_is_around():
     _, normals = shape.on(np.array([4]), np.array([[0.2, 0.3, 0.5]]))
     assert np.linalg.norm(normals[0]) == pytest.approx(1.0)
     assert normals[0, 1] < 0, "it faces as what is beside it"
+
+
+def test_normals_between_corners_belong_to_what_bends_one_way_and_back():
+    """Waves on a ball, as long as four of its facets: the mean of two corners' normals is 2.7 degrees off."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=1.0)
+    size, depth, waves = 0.02, 2e-4, 12.0
+
+    def bulge(p: np.ndarray) -> np.ndarray:
+        return size + depth * np.sin(waves * p[:, 0]) * np.sin(waves * p[:, 1])
+
+    shape = TrueShape(ball.vertices * bulge(ball.vertices)[:, None], np.asarray(ball.faces))
+    middles = np.repeat([[0.5, 0.5, 0.0]], len(shape.triangles), axis=0)
+    points, normals = shape.on(np.arange(len(shape.triangles)), middles)
+    step = 1e-7
+
+    def outside(p: np.ndarray) -> np.ndarray:
+        r = np.linalg.norm(p, axis=1)
+        return r - bulge(p / r[:, None])
+
+    slope = np.stack([outside(points + step * e) - outside(points - step * e) for e in np.eye(3)], axis=1)
+    meant = slope / np.linalg.norm(slope, axis=1, keepdims=True)
+    off = np.degrees(2 * np.arcsin(np.linalg.norm(normals - meant, axis=1) / 2))
+    assert np.sqrt(np.mean(off**2)) < 2.2
+
+
+def test_a_cone_does_not_bulge_below_its_tip():
+    """All of its triangles meet at the tip: as one smooth corner it lifted them by 4.3 mm."""
+    cone = trimesh.creation.cone(radius=0.03, height=0.05, sections=64)
+    shape = TrueShape(np.asarray(cone.vertices), np.asarray(cone.faces))
+    places = sample(shape.vertices, shape.triangles, 2000)
+    points, normals = shape.foot(places[places[:, 2] > 1e-3])
+    slant = np.array([0.05, 0.03]) / np.hypot(0.05, 0.03)
+    round_about = np.hypot(points[:, 0], points[:, 1])
+    off = (round_about - 0.03) * slant[0] + points[:, 2] * slant[1]
+    assert np.abs(off).max() < 5e-5
+    around = points[:, :2] / round_about[:, None]
+    meant = np.column_stack([around * slant[0], np.full(len(points), slant[1])])
+    assert np.einsum("kx,kx->k", normals, meant).min() > np.cos(np.radians(3))
 
 
 def test_curvatures_of_a_large_shape_take_no_more_pieces_than_memory_allows():
