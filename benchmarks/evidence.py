@@ -12,6 +12,7 @@ import math
 import os
 import platform
 import subprocess
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -22,6 +23,7 @@ from scipy.stats import binomtest
 from palpate.mechanics.disk.reading import read_text
 from palpate.mechanics.disk.writing import JSON, atomic_file
 from palpate.mechanics.errors import FileError
+from palpate.parallel.tasks import high_water_bytes
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,14 @@ def measured(command: str, figures: Sequence[Figure], clone: Path) -> Evidence:
         raise ValueError(f"'{command}' gave no figures to keep")
     today = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d")
     return Evidence(command, commit_of(clone), today, processor(), tuple(figures))
+
+
+def spent() -> tuple[Figure, ...]:
+    """Processor time and greatest memory of the command so far, without processes that it started."""
+    return (
+        Figure("the command itself, processor time", time.process_time(), unit="s"),
+        Figure("the command itself, greatest memory", high_water_bytes() / 1e6, unit="MB"),
+    )
 
 
 def commit_of(clone: Path) -> str:

@@ -48,6 +48,7 @@ class NumericalEffect(Effect):
     factor, in words that go on from them. opposite(keys): the whole advice where it errs the other way, else
     ''.
 
+    built_in: of how a simulator makes contact, which no setting of it changes: two of its runs share it.
     see(signal): of what shows in the samples themselves and needs no law; it is taken off before any law is
     fitted. None: it is searched for, as physical effects are.
     """
@@ -56,6 +57,7 @@ class NumericalEffect(Effect):
     advice: str = ""
     how_much: Callable[[Keys], str] | None = None
     opposite: Callable[[Keys], str] | None = None
+    built_in: bool = False
     see: Callable[[Signal], SampleEvidence] | None = None
 
     def advised(self, keys: Keys, own_words: str = "") -> str:

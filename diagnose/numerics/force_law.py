@@ -59,5 +59,6 @@ EFFECT = NumericalEffect(
     change=_change,
     advice="take a contact that solves the solid (finite elements under the tip) instead of a pressure field "
     "or springs a node; a contact modulus fits one depth alone",
+    built_in=True,
     hints=SearchHints(hides_strain=True, stands_for_strain=True, any_form=True, untold=(_BENT, np.inf)),
 )

@@ -79,8 +79,15 @@ class Numerics:
     found: Attribution | None = None
 
 
-def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Progress = silent) -> Numerics:
-    """Search the numerical effects in the forces of forward.touches, which are a simulator's."""
+def numerics_of(
+    forward: StatedForward,
+    rules: AttributionOptions,
+    progress: Progress = silent,
+    *,
+    beside_own: bool = False,
+) -> Numerics:
+    """Search the numerical effects in the forces of forward.touches, which are a simulator's. beside_own:
+    what it has of its own is taken off, and with it what is built in."""
     t = forward.touches
     typical = t.force_rms_n
     own = Noise(*(2 * [LEAST_SHARE * typical / np.sqrt(3)]))
@@ -92,7 +99,7 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
         forward, forward.stated.young_modulus_pa, nuisance=NUISANCE, options=rules,
         site_sd=np.full(len(t), NUISANCE.site_stiffness), finite_strain=strain,
     )  # fmt: skip
-    tried = [e for e in numericals() if e.see is None]
+    tried = [e for e in numericals() if e.see is None and not (beside_own and e.built_in)]
     found = attribute(search, tried, progress=progress)
     ratio_only = _within_common_error(found)
     names = tuple(n for n in found.chosen if n not in ratio_only)

@@ -2,8 +2,10 @@
 
 A simulator that is off already is no base of nothing: a contact that is too soft makes up for a mesh that is
 too stiff, and seems to mend it. So where its force at its best settings is known along the same path, that is
-diagnosed first; how far it is off our law, in proportion to the modulus, is taken off the force that is
-asked about, and what is left is what was changed.
+diagnosed first: at each place it has a curve of its own, so much force where our law has so much. Whatever is
+changed changes that curve's force: a contact that gives is felt at a lesser depth of it. So a force that is
+asked about is read off the curve as our law's, less what the curve leaves, and what is left beside our law is
+what was changed.
 """
 
 from __future__ import annotations
@@ -27,6 +29,10 @@ from palpate.mechanics.progress import Progress
 
 OWN = "its own"
 """How the force that a simulator is off by at its best settings is named in a pair."""
+_LITTLE = 0.02
+"""Of the typical force: where either has less, how many times the other it is says nothing."""
+_KNOTS = 16
+"""Of a place's curve, alike many samples between them."""
 
 
 def with_same_presses(one: Aligned, two: Aligned) -> tuple[Aligned, Aligned]:
@@ -42,27 +48,65 @@ def with_same_presses(one: Aligned, two: Aligned) -> tuple[Aligned, Aligned]:
 
 @dataclass(frozen=True)
 class Own:
-    """stated: what the simulator was given at its best; off: (n, 3) N, local, by which its force was off our
-    law; numerics: what that was named."""
+    """stated: what the simulator was given at its best; base, law: (n, 3) N, local, its force there and our
+    law's; curves: by place (k,) N of either, increasing from 0; site: (n,) the place of each row; numerics:
+    what the base was named."""
 
     stated: Stated
-    off: np.ndarray
+    base: np.ndarray
+    law: np.ndarray
+    curves: dict[int, tuple[np.ndarray, np.ndarray]]
+    site: np.ndarray
     numerics: Numerics
 
     def force(self, stated: Stated) -> np.ndarray:
         """(n, 3) N that it adds where other parameters are given: all force is in proportion to the
         modulus."""
-        return self.off * (stated.young_modulus_pa / self.stated.young_modulus_pa)
+        return (self.base - self.law) * self._level(stated)
+
+    def without(self, force: np.ndarray, stated: Stated) -> np.ndarray:
+        """(n, 3) N that our law would have: the simulator's force (n, 3) N without what is its own."""
+        level = self._level(stated)
+        return level * (self._read(force / level) + self.law - self._read(self.base))
+
+    def times(self) -> np.ndarray:
+        """(n, 1) how many times our law's force the simulator's is."""
+        read = np.linalg.norm(self._read(self.base), axis=1)
+        size = np.linalg.norm(self.base, axis=1)
+        return np.where(read > 0, size / np.maximum(read, 1e-12), 1.0)[:, None]
 
     def at(self, stated: Stated, weighing: GapSums) -> OwnFlaws:
         """What is said of it."""
         return OwnFlaws(self.numerics.named, self.numerics.candidates, weighing.rms_n(self.force(stated)))
 
+    def _level(self, stated: Stated) -> float:
+        return stated.young_modulus_pa / self.stated.young_modulus_pa
+
+    def _read(self, force: np.ndarray) -> np.ndarray:
+        """(n, 3) N of our law where the base has this force; beyond its greatest, in proportion."""
+        size = np.linalg.norm(force, axis=1)
+        out = force.copy()
+        for site, (own, law) in self.curves.items():
+            rows = (self.site == site) & (size > 0)
+            read = np.interp(size[rows], own, law) * np.maximum(size[rows] / own[-1], 1.0)
+            out[rows] *= (read / size[rows])[:, None]
+        return out
+
 
 def own_of(sides: Sides, rules: AttributionOptions, progress: Progress) -> Own:
     """What a simulator's force at its best settings has of its own."""
     found = named_numerics(sides, rules, progress)
-    return Own(sides.forward.stated, sides.forward.touches.local_force - found.law, found)
+    t = sides.forward.touches
+    base, site = t.local_force, t.site[t.press]
+    own, law = (np.linalg.norm(each, axis=1) for each in (base, found.law))
+    told = t.counted & (np.minimum(own, law) > _LITTLE * t.force_rms_n)
+    curves = {}
+    for place in np.unique(site[told]):
+        rows = np.flatnonzero(told & (site == place))
+        parts = np.array_split(rows[np.argsort(own[rows], kind="stable")], min(_KNOTS, len(rows)))
+        knots = np.array([[0.0, 0.0], *([np.median(own[p]), np.median(law[p])] for p in parts)])
+        curves[int(place)] = knots[:, 0], np.maximum.accumulate(knots[:, 1])
+    return Own(sides.forward.stated, base, found.law, curves, site, found)
 
 
 def made_up(

@@ -73,21 +73,26 @@ def named_numerics(
     goes into the force of all together."""
     if own is None:
         return _named(sides, rules, progress)
-    added = own.force(sides.forward.stated)
-    found = _named(_without(sides, added), rules, progress)
-    return dataclasses.replace(found, force={**found.force, "all": found.force["all"] + added})
+    without = _without(sides, own)
+    found, times = _named(without, rules, progress, beside_own=True), own.times()
+    force = {name: times * each for name, each in found.force.items()}
+    force["all"] = found.force["all"] + sides.raw - without.raw
+    return dataclasses.replace(found, force=force)
 
 
-def _without(sides: Sides, added: np.ndarray) -> Sides:
-    """The same less a force, (n, 3) N, local."""
+def _without(sides: Sides, own: Own) -> Sides:
+    """The same without what the simulator has of its own."""
     forward = copy.copy(sides.forward)
     t = forward.touches
-    taken = np.einsum("nij,ni->nj", t.frame[t.press], added)
-    forward.touches = dataclasses.replace(t, force=t.force - taken)
-    return dataclasses.replace(sides, forward=forward, raw=sides.raw - added)
+    local = own.without(t.local_force, forward.stated)
+    turned = np.einsum("nij,ni->nj", t.frame[t.press], local)
+    forward.touches = dataclasses.replace(t, force=turned)
+    return dataclasses.replace(sides, forward=forward, raw=own.without(sides.raw, forward.stated))
 
 
-def _named(sides: Sides, rules: AttributionOptions, progress: Progress) -> Numerics:
+def _named(
+    sides: Sides, rules: AttributionOptions, progress: Progress, *, beside_own: bool = False
+) -> Numerics:
     """What is named against the law. Presses that the tip fell through have a say until they did, where that
     is long enough, and get the law's force with what was named from there on."""
     forward, t = sides.forward, sides.forward.touches
@@ -99,9 +104,10 @@ def _named(sides: Sides, rules: AttributionOptions, progress: Progress) -> Numer
         cut, held = t, np.ones(len(t), bool)
     sides = dataclasses.replace(sides, fell_s=np.where(held, sides.fell_s, -np.inf))
     if held.all() and np.isinf(sides.fell_s).all():
-        return _with_seen(sides, numerics_of(forward, rules, progress))
+        return _with_seen(sides, numerics_of(forward, rules, progress, beside_own=beside_own))
     of_held = dataclasses.replace(forward, touches=cut).of(held)
-    return _with_seen(sides, _over_all(sides, numerics_of(of_held, rules, progress), held))
+    found = numerics_of(of_held, rules, progress, beside_own=beside_own)
+    return _with_seen(sides, _over_all(sides, found, held))
 
 
 def _over_all(sides: Sides, found: Numerics, held: np.ndarray) -> Numerics:

@@ -105,7 +105,7 @@ def diagnose_simulated(
         own = own_of(pair_forces(best, findings, base.stated), rules, part(progress, 0.6, 0.75))
     sides = pair_forces(given, findings, asked.stated)
     numerics = named_numerics(sides, rules, part(progress, 0.75, 0.95), own)
-    result = _concluded(_weighed(asked, options, rules, reality, sides, numerics), own)
+    result = _concluded(_weighed(asked, options, rules, reality, sides, numerics, own))
     progress("done", 1.0)
     return result
 
@@ -128,6 +128,7 @@ class _Weighed:
     weighing: GapSums
     gaps: dict[str, np.ndarray]
     least_n: float
+    own: Own | None
 
     def square(self, name: str) -> float:
         """N^2, the mean square of a gap."""
@@ -141,6 +142,7 @@ def _weighed(
     reality: Diagnosis,
     sides: Sides,
     numerics: Numerics,
+    own: Own | None,
 ) -> _Weighed:
     """The gap, and what is left of it as the parts are taken off (`gap_decomposition`)."""
     findings: Findings = reality.findings
@@ -164,11 +166,11 @@ def _weighed(
         real = dataclasses.replace(real, names=())  # true of the object, and no part of this gap
     return _Weighed(
         asked, options.seed, options.bootstrap, rules.doubt, reality, sides, numerics, real, wrong, measured,
-        weighing, gaps, rules.smallest * reality.noise_n,
+        weighing, gaps, rules.smallest * reality.noise_n, own,
     )  # fmt: skip
 
 
-def _concluded(w: _Weighed, own: Own | None) -> SimulatedGap:
+def _concluded(w: _Weighed) -> SimulatedGap:
     reality, numerics, weighing = w.reality, w.numerics, w.weighing
     findings: Findings = reality.findings
     whole = w.square("simulated")
@@ -233,9 +235,9 @@ def _concluded(w: _Weighed, own: Own | None) -> SimulatedGap:
         touches=forward.touches,
         gaps=w.gaps,
         simulated=w.sides.raw,
-        own=None if own is None else own.at(w.asked.stated, w.weighing),
+        own=None if w.own is None else w.own.at(w.asked.stated, w.weighing),
         coarse=coarse,
-        made_up=made_up(w.numerics, w.wrong, own, w.asked.stated, w.weighing, w.least_n),
+        made_up=made_up(w.numerics, w.wrong, w.own, w.asked.stated, w.weighing, w.least_n),
     )  # fmt: skip
 
 
@@ -302,13 +304,14 @@ def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:
         for name in NAMES if name in numerics.keys and name in numerics.force
     ]  # fmt: skip
     forward, flaws = w.sides.forward, list(numerics.values)
+    times = 1.0 if w.own is None else w.own.times()
     for p in w.wrong:
         # the run that has the right value has the simulator's flaws still: too stiff a mesh makes it more
         given = w.asked.stated
         both = (given, given.but(PARAMETER_OF[p.name], p.measured))
         was, now = (law_at(forward, each, numerics, flaws) for each in both)
         keys = {"stated": _finite(p.stated), "measured": _finite(p.measured)}
-        entries.append(entry(p.name, "parameters", 0.95, start - (now - was), keys))
+        entries.append(entry(p.name, "parameters", 0.95, start - times * (now - was), keys))
     for each in w.reality.entries:
         if (each.name,) == w.real.names:
             own = w.gaps["touches"] - w.gaps["reality"]

@@ -33,7 +33,7 @@ KIT = FolderKind(
     ("kit.json", "README.md", "score.py", "ci.yml", "bodies", "paths", "truth", "examples", "adapters"),
 )
 VERBATIM = ("score.py", "ci.yml", *(f"adapters/{name}" for name in (
-    "kit_files.py", "run_mujoco.py", "run_scikit_fem.py", "run_newton.py", "run_drake.py",
+    "kit_files.py", "run_mujoco.py", "run_scikit_fem.py", "run_newton.py", "run_drake.py", "run_sofa.py",
 )))  # fmt: skip
 """Files that stand here as they go into the kit."""
 

@@ -43,12 +43,12 @@ def names() -> list[str]:
 
 
 def _keep(path: str, name: str, options: Sequence[str], figures: Any) -> None:
-    """Write the figures with command, commit, date and processor."""
+    """Write the figures, and what they took, with command, commit, date and processor."""
     evidence = importlib.import_module("benchmarks.evidence")  # it lies in the clone, not in the product
     if not figures:
         raise OptionError(f"--evidence: 'palpate bench {name}' gives no figures to keep")
     words = ["palpate", "bench", name, *_deciding(options)]
-    kept = evidence.write(path, evidence.measured(" ".join(words), figures, clone()))
+    kept = evidence.write(path, evidence.measured(" ".join(words), [*figures, *evidence.spent()], clone()))
     print(f"kept: {kept}", file=sys.stderr)
 
 

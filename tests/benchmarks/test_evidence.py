@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.evidence import Evidence, Figure, measured, processor, read, write
+from benchmarks.evidence import Evidence, Figure, measured, processor, read, spent, write
 from palpate.mechanics.errors import FileError
 
 CLONE = Path(__file__).resolve().parents[2]
@@ -35,6 +35,14 @@ def test_what_is_written_is_read_back(tmp_path, evidence):
     assert [f["met"] for f in held["figures"]] == [True, False, None]
     assert held["figures"][0]["target"] == "at most 10 s (the paper's)"
     assert held["figures"][2]["spread"] == [1000.0, 1000.0]
+
+
+def test_what_a_command_took_grows_with_what_it_does():
+    before = [figure.value for figure in spent()]
+    held = bytearray(b"x" * 300_000_000)
+    after = [figure.value for figure in spent()]
+    assert after[0] > before[0] > 0 and after[1] >= max(before[1], len(held) / 1e6)
+    assert [figure.unit for figure in spent()] == ["s", "MB"]
 
 
 def test_numbers_that_are_not_finite_and_half_a_target_are_refused():

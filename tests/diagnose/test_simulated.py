@@ -116,36 +116,44 @@ def test_a_tip_held_by_a_spring_is_contact_stiffness_with_that_springs(world):
     assert found.parameters["stiffness_n_per_m"] == pytest.approx(1000.0, rel=0.06)
 
 
+def _half_too_stiff(world, *, compliance=0.0, **given):
+    """Forces of a simulator whose mesh is half too stiff, its tip on a spring of so many m/N; what it was
+    given."""
+    real, stated = world[2].forward, stated_of(given, world[1])
+    stiff = stated.but("young_modulus_pa", 1.5 * stated.young_modulus_pa)
+    forward = StatedForward(real.touches, real.places, stiff)
+    settings = forward.ideal(1.0)
+    settings.tool_compliance += compliance
+    local, frame = np.nan_to_num(forward.predict(settings)), real.places.frame[real.touches.press]
+    return Forces(real.touches.t, np.einsum("nij,ni->nj", frame, local), "a simulator"), stated
+
+
+def _judged(world, run, base=None):
+    asked = Asked(*run, OWN_CLOCK, base=None if base is None else Base(*base))
+    return diagnose_simulated(*world[:2], asked, FAST, reality=world[2])
+
+
 @pytest.mark.slow
 def test_a_simulator_that_is_off_already_is_judged_against_its_best(world):
     """Its mesh is half too stiff at its best, and a contact that is then made soft takes some of that off."""
-    real = world[2].forward
-    forward = StatedForward(real.touches, real.places, stated_of({}, world[1]))
-    law, soft = forward.ideal(1.0), forward.ideal(1.0)
-    soft.tool_compliance += 1e-3
-    law, soft = (np.nan_to_num(forward.predict(settings)) for settings in (law, soft))
-    frame = real.places.frame[real.touches.press]
-
-    def forces(local):
-        return Forces(real.touches.t, np.einsum("nij,ni->nj", frame, local), "a simulator")
-
-    stated = stated_of({}, world[1])
-    base = Base(forces(1.5 * law), stated)
-
-    def judged_against(base, local):
-        asked = Asked(forces(local), stated, OWN_CLOCK, base=base)
-        return diagnose_simulated(*world[:2], asked, FAST, reality=world[2])
-
-    alone = judged_against(None, 0.5 * law + soft)
-    result = judged_against(base, 0.5 * law + soft)
-    assert alone.effects[0] == "mesh_stiffness"  # what is asked for is what was changed
+    base, soft = _half_too_stiff(world), _half_too_stiff(world, compliance=1e-3)
+    assert _judged(world, soft).effects != ("contact_stiffness",)  # what is asked for is what was changed
+    result = _judged(world, soft, base)
     assert result.effects == ("contact_stiffness",) and result.own.effects == ("mesh_stiffness",)
     assert shares(result) == pytest.approx(1.0)
     (pair,) = result.made_up
     assert set(pair.effects) == {"contact_stiffness", "its own"} and pair.together_n < max(pair.alone_n)
     assert "make up for each other" in "\n".join(result.lines())
-    unchanged = judged_against(base, 1.5 * law)
+    unchanged = _judged(world, base, base)
     assert unchanged.effects == () and unchanged.made_up == ()
+
+
+@pytest.mark.slow
+def test_what_a_simulator_that_is_off_is_given_wrongly_acts_on_its_own_force(world):
+    """A tip a fifth too small takes its share of a force that is half too great, and is all that is named."""
+    small = {"tip_radius_m": 0.8 * world[1].tool.tip_radius_m}
+    result = _judged(world, _half_too_stiff(world, **small), _half_too_stiff(world))
+    assert result.effects == ("stated_tip_radius",)
 
 
 @pytest.mark.slow

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import sys
+import types
 from pathlib import Path
 
 import numpy as np
@@ -51,3 +53,46 @@ def test_mujoco_presses_the_slab_as_it_is(monkeypatch: pytest.MonkeyPatch, tmp_p
     force = press(body, PHYSICS, path[counted, 0], path[counted][:, None, 1:])[:, 0]
     true = truth[counted, 1:4]
     assert np.linalg.norm(force - true) < 0.1 * np.linalg.norm(true)
+
+
+class _Sofa(types.ModuleType):
+    """Of SofaPython3 what the kit's adapter calls; nothing moves. made: (type, fields) of every component."""
+
+    def __init__(self, points: np.ndarray) -> None:
+        super().__init__("Sofa")
+        self.points, self.made = points, []
+        self.Core = types.SimpleNamespace(Node=lambda name: self)
+        self.Simulation = types.SimpleNamespace(init=lambda root: None, animate=lambda root, dt: None)
+
+    def addChild(self, name: str) -> _Sofa:
+        return self
+
+    def addObject(self, kind: str, **fields: object) -> types.SimpleNamespace:
+        self.made.append((kind, fields))
+        value = types.SimpleNamespace(value=self.points)
+        return types.SimpleNamespace(position=value, center=types.SimpleNamespace(value=None))
+
+
+def test_sofas_scene_says_it_is_untested_and_holds_the_kits_body(monkeypatch: pytest.MonkeyPatch) -> None:
+    """SOFA itself is stood in for: what is asked of it, and the sign and place of a sphere's push on nodes
+    that stay where they are."""
+    mesh = box_mesh((4, 4, 2), (0.04, 0.04, 0.02))
+    body = {"points": mesh.points, "tetrahedra": mesh.tetrahedra, "fixed": np.flatnonzero(mesh.fixed)}
+    sofa = _Sofa(mesh.points)
+    monkeypatch.setitem(sys.modules, "Sofa", sofa)
+    monkeypatch.syspath_prepend(str(ADAPTERS))
+    module = importlib.import_module("run_sofa")
+    assert "UNTESTED" in str(module.__doc__)
+    t = np.array([0.0, 0.01])
+    top = mesh.points[:, 2].max() + PHYSICS["tip_radius_m"]
+    pressing = np.array([[0.0, 0.0, top + AIR_M], [0.0, 0.0, top - DEEPEST_M]])
+    hanging = pressing + [0.0, 0.0, 2 * AIR_M]
+    force = module.press(body, PHYSICS, t, np.stack([pressing, hanging], axis=1))
+    made = dict(sofa.made)
+    solid = made["TetrahedronFEMForceField"]
+    assert (solid["youngModulus"], solid["poissonRatio"]) == (2e4, 0.45)
+    assert made["FixedProjectiveConstraint"]["indices"] == body["fixed"].tolist()
+    assert made["MeshMatrixMass"]["totalMass"] == pytest.approx(1000 * 0.04 * 0.04 * 0.02)
+    assert not force[0].any() and not force[:, 1].any()
+    stiffness = module.PENALTY * PHYSICS["young_modulus_pa"] * PHYSICS["tip_radius_m"]
+    np.testing.assert_allclose(force[1, 0], [0, 0, stiffness * DEEPEST_M], atol=1e-9)

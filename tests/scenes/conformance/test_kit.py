@@ -100,6 +100,15 @@ def test_a_kit_is_small_the_same_every_time_and_knows_nothing_of_palpate(kit: Pa
     assert sum(p.stat().st_size for p in shipped) < MOST_SHIPPED_BYTES
 
 
+def test_the_example_of_a_ci_job_is_yaml_and_calls_files_of_the_kit(kit: Path) -> None:
+    yaml = pytest.importorskip("yaml")
+    job = yaml.safe_load((kit / "ci.yml").read_text())["jobs"]["score"]
+    commands = [step["run"].split() for step in job["steps"] if "run" in step]
+    called = [words[1] for words in commands if words[0] == "python"]
+    assert called and all((kit.parent / name).is_file() for name in called)
+    assert "--at-least" in commands[-1]
+
+
 def test_bodies_are_sound_and_say_the_same_in_each_format(kit: Path) -> None:
     import pyvista
 
