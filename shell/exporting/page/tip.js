@@ -5,6 +5,7 @@ const SLOW_MS = 34; // a frame that takes longer is drawn with fewer pixels
 const $ = (name) => document.getElementById(name);
 const about = JSON.parse($("about").textContent);
 const mm = (m, digits = 1) => (1e3 * m).toFixed(digits);
+const NOT_YET = [...$("parts").children].map((each) => each.textContent);
 const newtons = (n) => (Math.abs(n) < 9.995 ? n.toFixed(2) : n.toFixed(1));
 
 class SeenTip {
@@ -97,7 +98,7 @@ class SeenTip {
     Object.assign(this, { greeting: null, place: null, depth: 0, goal: 0, trail: [], peak: null, dirty: true });
     this.touch.release();
     for (const [name, words] of [["force", "– N"], ["band", ""]]) $(name).textContent = words;
-    this.parts(["not pressed yet"]);
+    this.parts(NOT_YET);
   }
 
   // A straight press at once, as a link, the table or a script asks for it.
@@ -252,7 +253,7 @@ class SeenTip {
       $("force").textContent = `${newtons(size(touch.force))} N`;
       $("band").textContent = `± ${newtons(Math.max(bandOf(tables, touch), 0.005))} N`;
       const parts = [`${mm(touch.depth)} mm deep`, `${newtons(touch.normalForce)} N inwards`, `${newtons(sideways)} N sideways${touch.slipping ? ", sliding" : ""}`];
-      if (tables.oneD) parts.push(`1D model: ${newtons(tables.oneDForce(touch.corners, touch.place.weights, touch.depth))} N`);
+      if (tables.oneD) parts.push(`${about.one_d_words}: ${newtons(tables.oneDForce(touch.corners, touch.place.weights, touch.depth))} N`);
       this.parts(parts);
     } else if (this.peak) {
       $("force").textContent = `${newtons(this.peak.pull)} N`;

@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +16,7 @@ import pytest
 
 import palpate as pp
 from palpate.devices.codecs import spacemouse
-from palpate.exporting.page.contents import force_band, shown_modes
+from palpate.exporting.page.contents import ONE_D, force_band, shown_modes
 from palpate.exporting.page.document import button, page_of
 from palpate.exporting.page.tables import first_depth, modes_of
 from palpate.mechanics.effects.registry import effect
@@ -25,6 +26,7 @@ from palpate.render.fem.renderer import FemRenderer
 from palpate.render.press import Stroke, press, read_curve
 from palpate.render.scene import in_the_air
 from palpate.scenes.scene import FIND_M, load_scene
+from palpate.words import renderer_words
 
 from ..show import browser
 
@@ -258,7 +260,9 @@ def test_the_tip_shows_once_what_it_does_unless_less_motion_is_liked(tab, writte
     opened(tab, written, lively=True)
     tab.wait("palpate.page.touch.normalForce > 0.1")
     tab.wait("palpate.page.greeting === null && !palpate.page.touch.touching")
-    assert tab.evaluate("document.getElementById('parts').textContent") == "not pressed yet"
+    assert (
+        tab.evaluate("document.getElementById('parts').textContent") == "not pressed yet curves: at its top"
+    )
     assert tab.evaluate("document.getElementById('copy').disabled"), "nobody pressed"
     opened(tab, written, lively=True)
     tab.wait("palpate.page.touch.normalForce > 0.1")
@@ -504,3 +508,13 @@ def test_a_page_of_a_hidden_nodule_names_the_task(renderer, monkeypatch, tmp_pat
     head = page.partition("<h1>")[2].partition("<canvas")[0]
     assert "nodule" in head.partition("</h1>")[0] and f"{1e3 * FIND_M:g} mm" in head
     assert not load_scene("demo").task
+
+
+def test_whatever_is_drawn_on_the_page_is_named_on_it_as_the_window_names_it(written):
+    """Red dots had no name; one model was 'finite elements' here and 'this model' in the window."""
+    page = written.read_text(encoding="utf-8")
+    legend = re.search(r'<ul class="legend">.*?</ul>', page, re.DOTALL)[0]
+    assert '<i class="place"></i>places of' in legend
+    for name in ("fem", ONE_D):
+        assert renderer_words(name) in legend and f"{renderer_words(name)} [N]</th>" in page
+    assert "finite elements" not in legend and "1D model" not in legend
