@@ -205,12 +205,10 @@ class SeenTip {
     return this.dots_ ??= Array.from({ length: about.presses.count }, (_, i) => [...this.presses.points.slice(3 * i, 3 * i + 3)]);
   }
 
-  // About the greatest force that this page shows, N: the arrow's scale.
+  // The force of the deepest press on the top, N: the arrow's scale. At the foot forces are many times as great.
   get strongest() {
-    return this.strongest_ ??= Math.max(...[0, 0.25, 0.5, 0.75].map((share) => {
-      const v = Math.floor(share * this.surface.vertices.length / 3);
-      return this.tables.response_([v, v, v], [1, 0, 0], this.tables.most)[0] * this.tables.most;
-    }));
+    const { triangle, weights } = this.topPlace(), corners = this.surface.triangles.subarray(3 * triangle, 3 * triangle + 3);
+    return this.strongest_ ??= this.tables.response_(corners, weights, this.tables.most)[0] * this.tables.most;
   }
 
   nearestPress(point) {

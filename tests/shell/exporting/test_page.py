@@ -250,6 +250,26 @@ def test_a_page_presses_first_as_deep_as_the_game_asks_and_less_into_what_is_thi
 
 
 @needs_browser
+def test_a_press_of_the_table_is_seen_wherever_it_lies(tab):
+    """Of a place on the far side the tip stayed behind the object, and the picture above the screen."""
+    rows = tab.evaluate("document.querySelectorAll('[data-at]').length")
+    for row in range(rows):
+        tab.evaluate(f"document.querySelectorAll('[data-at]')[{row}].click()")
+        towards = "palpate.page.first.normal.reduce((sum, n, i) => sum + n * palpate.page.camera.back[i], 0)"
+        assert tab.evaluate(towards) > 0.1
+        stage = "document.getElementById('stage').getBoundingClientRect()"
+        assert tab.evaluate(f"{stage}.bottom > 0 && {stage}.top < innerHeight")
+
+
+@needs_browser
+def test_the_forces_arrow_is_long_enough_to_be_seen(tab):
+    """Its scale was that of the stiffest corner, at the foot: of a usual press it was a dot beside the tip."""
+    tab.evaluate("palpate.page.begin(palpate.page.topPlace(), true)")
+    tab.wait("palpate.page.depth === palpate.page.goal && palpate.page.touch.normalForce > 0.05")
+    assert tab.evaluate("0.5 * palpate.page.touch.normalForce / palpate.page.strongest") > 0.08
+
+
+@needs_browser
 def test_the_slider_stands_at_the_first_depth(tab, renderer):
     assert state(tab, "wanted") == pytest.approx(first_depth(renderer.model))
 
