@@ -263,7 +263,7 @@ def test_a_press_of_the_table_is_seen_wherever_it_lies(tab):
 
 @needs_browser
 def test_the_forces_arrow_is_long_enough_to_be_seen(tab):
-    """Its scale was that of the stiffest corner, at the foot: of a usual press it was a dot beside the tip."""
+    """Its scale was that of the stiffest corner, at the foot: of a usual press it was a dot."""
     tab.evaluate("palpate.page.begin(palpate.page.topPlace(), true)")
     tab.wait("palpate.page.depth === palpate.page.goal && palpate.page.touch.normalForce > 0.05")
     assert tab.evaluate("0.5 * palpate.page.touch.normalForce / palpate.page.strongest") > 0.08
