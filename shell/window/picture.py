@@ -32,7 +32,7 @@ BAR = 11
 
 LIGHTS = (((-0.4, 0.55, 1.0), 0.9), ((0.9, -0.1, 0.6), 0.45))
 """Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
-SKIN = {"ambient": 0.5, "diffuse": 0.5}
+SKIN: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.5}
 """How the object takes light: as matt, and its sides as light, as on a page that is pressed."""
 
 FAR = [COLOURS["object"], COLOURS["fem"], COLOURS["displaced"]]
