@@ -28,7 +28,7 @@ from palpate.mechanics.errors import OptionError
 from palpate.operations.bench import clone
 
 PARTS = ("install", "help", "demo", "touch", "nodule")
-FIRST_OVER_WARM, WARM_DEMO_CPU_S, FIRST_TOUCH_S, WARM_TOUCH_S, HELP_S = 1.4, 50.0, 15.0, 4.0, 0.3
+FIRST_OVER_WARM, WARM_DEMO_CPU_S, FIRST_TOUCH_S, WARM_TOUCH_S, HELP_S = 1.25, 40.0, 15.0, 4.0, 0.3
 
 
 class Spent(NamedTuple):

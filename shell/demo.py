@@ -79,24 +79,24 @@ def run_demo(source: Path | str, folder: Path, options: DemoOptions, seed: int =
         seconds[label] = time.perf_counter() - start
 
     recording = read_recording(source)
+    diagnosis = None
     with warming_up() as compiling:
         with stage("reconstruct") as progress:
             done = reconstruct(recording, save=folder / "model", seed=seed, progress=progress)
             model = done.model
         with stage("precompute") as progress:
             rendering = renderer(model, options.renderer, progress=progress)
-            progress("compiling", 0.99)
+        if options.diagnosis:  # needs nothing of what another core still compiles
+            with stage("diagnose") as progress:
+                most = AttributionOptions().greatest_number
+                found = diagnose(recording, model, fast=options.fast, most=most, seed=seed, progress=progress)
+                diagnosis = found if isinstance(found, Diagnosis) else None  # no simulator was named
+        with stage("replay") as progress:
+            progress("compiling", 0.0)
             compiling()
-    with stage("replay") as progress:
-        replayed = replay(rendering, recording, progress=progress)
+            replayed = replay(rendering, recording, progress=progress)
     with stage("feel at 1 kHz") as progress:
         servo = run_headless(model, options.renderer, seconds=options.seconds, seed=seed, progress=progress)
-    diagnosis = None
-    if options.diagnosis:
-        with stage("diagnose") as progress:
-            most = AttributionOptions().greatest_number
-            found = diagnose(recording, model, fast=options.fast, most=most, seed=seed, progress=progress)
-            diagnosis = found if isinstance(found, Diagnosis) else None  # no simulator was named
     return DemoResult(
         recording,
         done,

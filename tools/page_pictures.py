@@ -1,5 +1,5 @@
 """Make the pictures of pages and of comparisons in `docs/images`, by a browser: `page-demo`, `page-phone`,
-`compare-by-press`, `compare-left-out-foot`.
+`press`, `compare-by-press`, `compare-left-out-foot`.
 
 The demo and the comparison are of the embedded cylinder; the phone's is the page of a diagnosis, in the dark.
 """
@@ -16,14 +16,17 @@ from typing import Any
 import palpate as pp
 from palpate.mechanics.disk.writing import PNG, atomic_file
 from palpate.operations.demo import demo
+from palpate.operations.export import export
 from palpate.show.comparison import draw
 from palpate.show.comparison.figures import across_region
 from palpate.show.page import drawn, png_and_drawing
-from tests.shell.show.browser import a_tab
+from tests.shell.show.browser import Tab, a_tab
 from tools.script import script
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
 REGION = "base-band"
+PRESS, DEPTH_M = 13, 0.006
+"""Which press's place of the demo's is pressed on the page, counted from 1, and how deep."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Write the four; nothing to tell of them."""
+    """Write the five; nothing to tell of them."""
     folder: Path = arguments.folder
     compared = pp.compare("silicone-1-cylinder", progress=False)
     _write(folder / "compare-by-press.png", drawn(draw, compared, 8, 3.2, layout=None))
@@ -47,7 +50,20 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         tab.open(diagnosis, 390, 844, dark=True)
         tab.evaluate("document.querySelector('.view3d').scrollIntoView()")
         tab.picture(folder / "page-phone.png")
+        pressed(tab, Path(work), folder / "press.png")
     return {}
+
+
+def pressed(tab: Tab, work: Path, picture: Path) -> None:
+    """The picture of a page to press, under the tip; the page is written to the folder work."""
+    export("demo", to="page", path=work / "touch.html")
+    tab.open(work / "touch.html", 1180, 670)
+    tab.wait("window.palpate !== undefined")
+    place = f"palpate.page.presses.points.slice({3 * PRESS - 3}, {3 * PRESS})"
+    tab.evaluate(f"palpate.page.setDepth({DEPTH_M}); palpate.page.pressInSight(Array.from({place}))")
+    tab.wait("document.getElementById('parts').textContent.includes('deep')")
+    tab.evaluate("new Promise((drawn) => setTimeout(drawn, 1000))")
+    tab.picture(picture)
 
 
 def _write(path: Path, figure: Any) -> None:

@@ -253,11 +253,12 @@ def verdict(result: Comparison) -> str:
     others = list(RIVALS)
     best = min(others, key=lambda n: result.rmse_n[n])
     ratio = result.rmse_n[best] / result.rmse_n["fem"]
-    words = (
-        f"FEM errs {ratio:.1f} times less than {best}, the better 1D model"
-        if ratio >= 1
-        else f"{best} errs {1 / ratio:.1f} times less than FEM"
-    )
+    if f"{max(ratio, 1 / ratio):.1f}" == "1.0":
+        words = f"FEM errs as much as {best}, the better 1D model"
+    elif ratio > 1:
+        words = f"FEM errs {ratio:.1f} times less than {best}, the better 1D model"
+    else:
+        words = f"{best} errs {1 / ratio:.1f} times less than FEM"
     wins = {n: result.wins(n) for n in others}
     lost = [r.region.name for r in result.regions if min(r.rmse_n[n] for n in others) < r.rmse_n["fem"]]
     words += f"; of {len(result.presses)} presses FEM predicts {result.wins('fem')} best"

@@ -104,7 +104,7 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
         ),
         entries=entries_of(findings, answer, gaps, counts),
         young_modulus_pa=found.final.found.modulus,
-        next_touch=proposed(findings.search, found, answer.rivals),
+        next_touch=proposed(findings.search, found, answer.names, answer.rivals),
         errors_n=_errors(findings),
         reasons=tuple(answer.reasons),
         confusable=tuple(_alike(findings)),

@@ -23,7 +23,7 @@ from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.whiten import Whitener
-from palpate.diagnosis.verdict.result import NextTouch
+from palpate.diagnosis.verdict.result import NOTHING, NextTouch, parted
 from palpate.mechanics.effects.settings import ForwardSettings
 
 DEPTHS = (0.35, 0.8, 1.2)
@@ -34,6 +34,8 @@ RIGID_N, RIGID_M = 4.0, 5e-5
 """Force of a press on the support, and how far readings on something rigid scatter."""
 RETRACED_M = 3e-4
 """By how much an outline that is traced twice is off, over a stretch."""
+Pair = tuple[tuple[str, JudgedSet], tuple[str, JudgedSet]]
+"""Two explanations: name and fit."""
 
 
 def plans() -> list[Plan]:
@@ -43,23 +45,37 @@ def plans() -> list[Plan]:
     return [*once, *dragged, Plan(0.8, 0.02, 0.3, 0.0, 2)]
 
 
-def proposed(search: Search, found: Attribution, candidates: Sequence[str]) -> NextTouch | None:
-    """The press that best separates the two explanations that are closest; None where there are not two."""
+def proposed(
+    search: Search, found: Attribution, names: Sequence[str], candidates: Sequence[str]
+) -> NextTouch | None:
+    """The press that best separates two explanations that are left open: what is named (or, too, a candidate)
+    from its rival, else the two likeliest candidates, or the only one from NOTHING. Where nothing known is
+    left open, what was picked or gains most from what comes nearest to it; None where there are not two."""
+    pair = contenders(found, names, candidates)
+    return None if pair is None else next_touch(search.forward, *pair, search.nuisance)
+
+
+def contenders(found: Attribution, names: Sequence[str], candidates: Sequence[str]) -> Pair | None:
+    """The two explanations that the next touch separates, as `proposed` says; each with its fit."""
     for scores, name in zip(found.steps, found.picked, strict=False):
         rival = next((c for c in candidates if c in scores and c != name), None)
-        if rival is not None:
-            return _separating(search, scores, name, rival)
+        if rival is not None and name in (*names, *candidates):
+            return _pair(scores, name, rival)
+    last = found.steps[-1]
+    left = [c for c in candidates if c in last]
+    if len(left) > 1:
+        return _pair(last, left[0], left[1])
+    if left:
+        return (left[0], last[left[0]].candidate), (NOTHING, found.final)
     ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
     if len(ranked) < 2:
         return None
     first = found.picked[0] if found.picked else ranked[0].name
-    second = next(s.name for s in ranked if s.name != first)
-    return _separating(search, found.scores, first, second)
+    return _pair(found.scores, first, next(s.name for s in ranked if s.name != first))
 
 
-def _separating(search: Search, scores: dict[str, Score], first: str, second: str) -> NextTouch | None:
-    pair = ((first, scores[first].candidate), (second, scores[second].candidate))
-    return next_touch(search.forward, *pair, search.nuisance)
+def _pair(scores: dict[str, Score], first: str, second: str) -> Pair:
+    return (first, scores[first].candidate), (second, scores[second].candidate)
 
 
 def next_touch(
@@ -114,8 +130,9 @@ def _rigid(forward: Forward, first: tuple[str, JudgedSet], second: tuple[str, Ju
     one, other = (_meant(forward, c).tool_compliance for _, c in (first, second))
     gives = RIGID_N * abs(one - other)
     why = (
-        f"pressing the bare support three times with some {RIGID_N:g} N parts {_both(first, second)} most: a "
-        f"tool that yields reads {1e3 * gives:.2f} mm of travel there, where nothing else does"
+        f"pressing the bare support three times with some {RIGID_N:g} N parts "
+        f"{parted((first[0], second[0]))} most: a tool that yields reads "
+        f"{1e3 * gives:.2f} mm of travel there, where nothing else does"
     )
     return _on_the_support(forward, first, second, "rigid", gives / RIGID_M, why) if gives > 0 else None
 
@@ -127,8 +144,8 @@ def _retrace(
     one, other = (_meant(forward, c).onset for _, c in (first, second))
     moved = float(np.sqrt(((one - other) ** 2).mean()))
     why = (
-        f"tracing the base once more, now, parts {_both(first, second)} most: an object that moved is "
-        f"{1e3 * moved:.1f} mm from where it was traced first"
+        f"tracing the base once more, now, parts {parted((first[0], second[0]))} most: an object that "
+        f"moved is {1e3 * moved:.1f} mm from where it was traced first"
     )
     return _on_the_support(forward, first, second, "retrace", moved / RETRACED_M, why) if moved > 0 else None
 
@@ -136,10 +153,6 @@ def _retrace(
 def _meant(forward: Forward, candidate: JudgedSet) -> ForwardSettings:
     """What a candidate's effects set, its first touches aside."""
     return settings_of(forward, candidate.found.effects, candidate.found.values)
-
-
-def _both(first: tuple[str, JudgedSet], second: tuple[str, JudgedSet]) -> str:
-    return f"{first[0].replace('_', ' ')} from {second[0].replace('_', ' ')}"
 
 
 def _on_the_support(
@@ -170,6 +183,6 @@ def _why(plan: Plan, first: str, second: str, size: float, sigmas: float) -> str
     held = f", held {plan.hold:.1f} s" if plan.hold > 1 else ""
     return (
         f"of all presses compared, a {pace}, {depth} one{extra}{held} at this place parts "
-        f"{first.replace('_', ' ')} from {second.replace('_', ' ')} most: typically {size * 1e3:.0f} mN, "
+        f"{parted((first, second))} most: typically {size * 1e3:.0f} mN, "
         f"{sigmas:.0f} times what noise and our own errors would do"
     )

@@ -3,6 +3,7 @@ report."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -84,10 +85,19 @@ class EffectEntry:
         }
 
 
+NOTHING = "none"
+"""In the place of an effect's name: that nothing more is there."""
+
+
+def parted(names: Sequence[str]) -> str:
+    """'time delay from backlash': what a touch separates, in words."""
+    return " from ".join("nothing" if name == NOTHING else name.replace("_", " ") for name in names)
+
+
 @dataclass(frozen=True)
 class NextTouch:
-    """What would best separate `separates`: a "press" of the object, or what is done beside it, "rigid"
-    presses of the bare support or the base traced once more ("retrace").
+    """What would best separate the two of `separates` (names, or NOTHING): a "press" of the object, or what
+    is done beside it, "rigid" presses of the bare support or the base traced once more ("retrace").
 
     difference_n: rms by which predictions of a press differ; sigmas: by how many times noise and our own
     errors what is separated differs.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
 import sys
 from functools import cache
 from pathlib import Path
@@ -22,6 +23,8 @@ _LANES = 8  # columns that a processor takes at once: the library rounds what is
 
 @cache
 def _library() -> ctypes.CDLL | None:
+    # its threads else spin for 200 ms after every call: 4 of the demo's 52 s of the processor
+    os.environ.setdefault("KMP_BLOCKTIME", "0")
     # where MKL's wheels put it; pypardiso walks through the whole environment, seconds in a process
     for path in (
         *Path(sys.prefix, "lib").glob("libmkl_rt.*"),

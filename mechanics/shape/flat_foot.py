@@ -26,9 +26,10 @@ _SINKS = (0.02, 0.03, 0.05, 0.08, 0.12, 0.16, 0.2, 0.25, 0.3)
 """Of the height: what is tried where a value of --sink is proposed."""
 _HANGING = 0.02
 """Of the volume: what may hang in the air."""
-_TILT, _FLAT, _A_FOOT, _ON_IT = 15.0, 0.002, 0.04, 0.5
+_TILT, _FLAT, _A_FOOT, _ON_IT, _ALIKE = 15.0, 0.002, 0.04, 0.5, 0.95
 """A foot that is tilted in the file: its greatest angle, degrees; how far its triangles lie off its plane, of
-the size; its least share of the surface; the share of it on the stated plane from which that is right."""
+the size; its least share of the surface; the share of it on the stated plane from which that is right; of the
+largest flat face how large another is that may be the foot as well."""
 
 
 class PointFoot(PalpateWarning):
@@ -77,7 +78,7 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
     if _share(vertices, triangles, foot) < _LEAST_FOOT:
         raise SurfaceError(
             f"'{surface.name}' has no flat foot to stand on with {up} up: "
-            f"{_feet(surface)}{_way(surface, normal)}"
+            f"{_feet(surface, normal)}{_way(surface, normal)}"
         )
     hanging, of = _hanging(vertices, triangles, foot)
     if hanging > _HANGING:
@@ -104,8 +105,9 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
     return Standing(vertices, triangles, middle, normal)
 
 
-def _feet(surface: ClosedSurface) -> str:
-    """The ways up in which it stands flat, in words: along the file's axes, else on its largest flat face."""
+def _feet(surface: ClosedSurface, normal: np.ndarray) -> str:
+    """The ways up in which it stands flat, in words: along the file's axes, else on its largest flat face, of
+    alike ones that nearest to the stated plane."""
     vertices, triangles = surface.vertices, surface.triangles
     feet = {up: _foot(vertices, triangles, direction(up)) for up in UPS}
     share = {up: _share(vertices, triangles, foot) for up, foot in feet.items()}
@@ -115,7 +117,7 @@ def _feet(surface: ClosedSurface) -> str:
     ]  # fmt: skip
     if flat:
         return f"its flat ones are for --up {', '.join(flat)}; or "
-    tilted = _tilted(vertices, triangles, direction("+z"), 180.0)
+    tilted = _tilted(vertices, triangles, normal, 180.0)
     return (
         "" if tilted is None else f"its flat foot is for --up={','.join(f'{x:.4g}' for x in tilted[2])}; or "
     )
@@ -235,7 +237,9 @@ def _tilted(
 
     if not len(planes):
         return None
-    best = max(planes, key=lambda plane: float(area[on(plane)].sum()))
+    flat = np.array([area[on(plane)].sum() for plane in planes])
+    alike = planes[flat >= _ALIKE * flat.max()]  # a cylinder's two ends: it stands as it is, not on its head
+    best = alike[np.argmin(alike[:, :3] @ normal)]
     foot, stated = on(best), on(np.array([*-normal, float((vertices @ normal).min())]))
     share = float(area[foot & stated].sum() / max(area[foot].sum(), 1e-300))
     if area[foot].sum() < _A_FOOT * area.sum() or share >= _ON_IT or area[stated].sum() > area[foot].sum():

@@ -60,7 +60,9 @@ class OneLineParser(argparse.ArgumentParser):
     meant; help is `HelpWords`, and shows what most people use; `--help-all` shows every option."""
 
     def __init__(self, **keywords: Any) -> None:
-        super().__init__(**{"formatter_class": HelpWords, "add_help": False, **keywords})
+        super().__init__(**{
+            "formatter_class": HelpWords, "add_help": False, "allow_abbrev": False, **keywords,
+        })  # fmt: skip
         self.add_argument("-h", "--help", action="help", help="show this help and exit")
         self.add_argument("--help-all", action=_AllHelp, help="show every option and exit")
 
@@ -75,8 +77,8 @@ class OneLineParser(argparse.ArgumentParser):
         if not any(action.nargs == argparse.REMAINDER for action in self._actions):
             for word in words[: words.index("--") if "--" in words else None]:
                 flag = word.partition("=")[0]
-                if word.startswith("--") and not any(each.startswith(flag) for each in flags):
-                    like = near(flag, flags)
+                if word.startswith("--") and flag not in flags:
+                    like = [each for each in flags if each.startswith(flag)] or near(flag, flags)
                     self.error(f"'{flag}' is not an option" + (f"; did you mean {like[0]}?" if like else ""))
             words = self._with_their_values(words)
         return super().parse_args(words, namespace)
@@ -87,8 +89,7 @@ class OneLineParser(argparse.ArgumentParser):
         joined: list[str] = []
         for word in words:
             last = joined[-1] if joined else ""
-            asks = last in takers or (len(last) > 2 and any(flag.startswith(last) for flag in takers))
-            if "--" not in joined and last.startswith("--") and asks and _NEGATIVE.match(word):
+            if "--" not in joined and last in takers and _NEGATIVE.match(word):
                 joined[-1] = f"{last}={word}"
             else:
                 joined.append(word)

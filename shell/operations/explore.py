@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,8 +24,8 @@ from palpate.diagnosis.explore.goals import GoalOptions, check_goals
 from palpate.diagnosis.explore.segments import Instrument
 from palpate.diagnosis.explore.suggestion import Explored
 from palpate.mechanics.errors import DeviceError, OptionError
-from palpate.mechanics.options import check_ranges
-from palpate.mechanics.plausible import POISSON_RATIO
+from palpate.mechanics.options import check_ranges, flag_of
+from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.recording.recording import read_recording
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, operation, option
@@ -50,7 +51,9 @@ def explore(
     device: Annotated[
         str | None, option("explore in the touch window: mouse, or another", metavar="NAME")
     ] = None,
-    scene: Annotated[str, option("with --device: what is felt", metavar="MODEL_OR_SCENE")] = "nodule",
+    scene: Annotated[
+        str | None, option("with --device: what is felt; None: nodule", metavar="MODEL_OR_SCENE")
+    ] = None,
     screenshot: Annotated[
         str | None, option("with --device: save the window at its end", metavar="PNG", advanced=True)
     ] = None,
@@ -77,9 +80,18 @@ def explore(
             advanced=True,
         ),
     ] = None,
-    tip_radius_m: Annotated[float, option("radius of the spherical tip", unit="m", advanced=True)] = 0.005,
-    rate_hz: Annotated[float, option("with --robot: samples a second", unit="Hz", advanced=True)] = 1000.0,
-    poisson_ratio: Annotated[float, option("Poisson's ratio of the object", advanced=True)] = 0.49,
+    tip_radius_m: Annotated[
+        float | None,
+        option(
+            "with --robot or --phantom: radius of the spherical tip; None: 0.005", unit="m", advanced=True
+        ),
+    ] = None,
+    rate_hz: Annotated[
+        float | None, option("with --robot: samples a second; None: 1000", unit="Hz", advanced=True)
+    ] = None,
+    poisson_ratio: Annotated[
+        float | None, option("with --robot: Poisson's ratio of the object; None: 0.49", advanced=True)
+    ] = None,
     young_modulus_pa: Annotated[
         float | None,
         option(
@@ -94,27 +106,33 @@ def explore(
     file: Given[PhantomFileOptions],
     goals: GoalOptions,
     reach: ReachOptions,
-    errors: RobotOptions,
+    errors: Given[RobotOptions],
     call: Call,
 ) -> Explored:
     """Explore until a goal, the limit or the robot ends it; what was known after each touch."""
     if (phantom is not None) + robot + (device is not None) != 1:
         raise OptionError("give who touches: one of --phantom NAME, --robot and --device NAME")
     check_goals(goals)
-    if not POISSON_RATIO.takes(poisson_ratio):
-        raise OptionError(f"--poisson-ratio is {poisson_ratio}; it must be {POISSON_RATIO.words}")
     begun = partial(_explorer, going_on, goals, reach, seed)
+    said = {
+        "scene": scene, "screenshot": screenshot, "seconds": seconds, "effects": effects,
+        "tip_radius_m": tip_radius_m, "rate_hz": rate_hz, "poisson_ratio": poisson_ratio,
+        "young_modulus_pa": young_modulus_pa, **file, **errors,
+    }  # fmt: skip
+    _refuse_idle("--robot" if robot else "--device" if device else "--phantom", said)
+    tip_radius_m = 0.005 if tip_radius_m is None else tip_radius_m
     if robot:
         result = _by_robot(begun, output, rate_hz, tip_radius_m, poisson_ratio)
     elif device:
-        given = {"device": device, "seed": seed, "seconds": seconds, "screenshot": screenshot}
-        result = _in_window(begun, output, scene, given, call)
+        given = {"device": device, "seed": seed, "seconds": seconds, "screenshot": screenshot, **file}
+        result = _in_window(begun, output, scene or "nodule", given, call)
     else:
         thing = named(str(phantom), **file)
         options = SimulateOptions(young_modulus_pa=young_modulus_pa, tip_radius_m=tip_radius_m)
         check_ranges(options)
         acting = effects_from(effects) or {}
-        explored = LaboratoryRobot(thing, acting, seed=seed, options=options, robot=errors)
+        errs = RobotOptions(**errors)
+        explored = LaboratoryRobot(thing, acting, seed=seed, options=options, robot=errs)
         result = _on_phantom(begun, output, explored, goals.most, call)
     call.said = True
     if robot:  # whose lines are all JSON
@@ -124,6 +142,24 @@ def explore(
     else:
         call.then_report(result, report)
     return result
+
+
+_OF_A_FILE = frozenset(each.name for each in fields(PhantomFileOptions))
+_TAKES = {
+    "--phantom": {"effects", "young_modulus_pa", "tip_radius_m", *_OF_A_FILE}
+    | {each.name for each in fields(RobotOptions)},
+    "--device": {"scene", "screenshot", "seconds", *_OF_A_FILE},
+    "--robot": {"tip_radius_m", "rate_hz", "poisson_ratio"},
+}
+"""Who touches: what is said of that kind of exploration alone."""
+
+
+def _refuse_idle(who: str, said: Mapping[str, Any]) -> None:
+    """Raise OptionError for what would be said in vain: another kind of exploration takes it."""
+    for name in (name for name, value in said.items() if value is not None and name not in _TAKES[who]):
+        flag = flag_of(explore.operation.fields[name])
+        others = " or ".join(each for each, names in _TAKES.items() if name in names)
+        raise OptionError(f"{flag} goes with {others}, not with {who}")
 
 
 Begun = Callable[[Instrument, float], Explorer]
@@ -176,9 +212,15 @@ def _in_window(begun: Begun, output: str, scene: str, given: Mapping[str, Any], 
     return kept[-1].explored(output)
 
 
-def _by_robot(begun: Begun, output: str, rate_hz: float, tip_radius_m: float, nu: float) -> Explored:
+def _by_robot(
+    begun: Begun, output: str, rate_hz: float | None, tip_radius_m: float, poisson_ratio: float | None
+) -> Explored:
+    rate_hz = 1000.0 if rate_hz is None else rate_hz
+    nu = USUAL_POISSON_RATIO if poisson_ratio is None else poisson_ratio
     if not (rate_hz > 0 and tip_radius_m > 0):
         raise OptionError("--rate and --tip-radius must be greater than 0")
+    if not POISSON_RATIO.takes(nu):
+        raise OptionError(f"--poisson-ratio is {nu}; it must be {POISSON_RATIO.words}")
     explorer = begun(Instrument(tip_radius_m, rate_hz, {"poisson_ratio": nu}), nu)
 
     def send(line: str) -> None:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from palpate.mechanics.disk.writing import JSON, PNG, atomic_file
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import number, pairs, unknown
+from palpate.mechanics.recording.recording import read_recording
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, argument, operation, option
 from palpate.operations._shared import SAMPLES, PhantomFileOptions, Seed, report_option, save_option
@@ -158,7 +159,8 @@ def simulate(
         return result
     path = write_sealed(str(save), result.recording, result.truth, str(truth))
     call.then(f"written to {path}")
-    call.following = [partial(next_lines, result)]
+    unlabelled = dataclasses.replace(result, recording=read_recording(path))
+    call.following = [partial(next_lines, unlabelled)]
     sealed: Any = _Sealed(result, path)
     return sealed
 

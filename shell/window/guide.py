@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pyvista
 
+from palpate.diagnosis.explore.estimate import LEAST_PRESSES
 from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Suggestion
 from palpate.diagnosis.explore.segments import Segment
 from palpate.mechanics.model.model import Model
@@ -189,6 +190,8 @@ class Guide:
         s, state = self.suggestion, self.state
         why = state.trouble.split(" (")[0].split(":")[0]
         known = f"no shape yet: {why}" if why else "nothing is known yet"
+        if state.made < LEAST_PRESSES:  # what a sliding tip met is no press that failed
+            known = f"{state.made} of the {LEAST_PRESSES} presses that show a shape"
         if state.surface:
             low, high = state.modulus_ci95_pa
             known = (

@@ -30,8 +30,20 @@ SPREAD = 2
 BAR = 11
 """Size of the colour bar's type, in a window of full size."""
 
+LIGHTS = (((-0.4, 0.55, 1.0), 0.9), ((0.9, -0.1, 0.6), 0.45))
+"""Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
+SKIN: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.5}
+"""How the object takes light: as matt, and its sides as light, as on a page that is pressed."""
+
 FAR = [COLOURS["object"], COLOURS["fem"], COLOURS["displaced"]]
 """Of displacement: where nothing moves the object has its own colour."""
+
+
+def add_lights(plotter: pyvista.Plotter) -> None:
+    """Light the active subplot, which has no light of its own, as all objects are lit."""
+    for place, strength in LIGHTS:
+        light = pyvista.Light(position=place, light_type="camera light", intensity=strength)
+        plotter.add_light(light, only_active=True)
 
 
 class ObjectPicture:
@@ -128,8 +140,7 @@ class ObjectPicture:
             cmap=colours,
             clim=limits,
             opacity=opacity,
-            ambient=0.3,
-            diffuse=0.62,
+            **SKIN,
             scalar_bar_args={
                 "title": self._bar,
                 "n_labels": 2,  # a third would lie under the title

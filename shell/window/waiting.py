@@ -20,6 +20,7 @@ from palpate.scenes.kept import kept_surface
 from palpate.scenes.phantoms import phantom
 from palpate.scenes.scene import Scene
 from palpate.show.colours import COLOURS, GREY, HINT, PAPER, STAGE
+from palpate.window.picture import SKIN, add_lights
 from palpate.window.widgets import Board, Item
 
 T = TypeVar("T")
@@ -71,6 +72,7 @@ class WaitingWindow:
             window_size=list(size),
             shape=(1, 1 + len(scenes)),
             border=False,
+            lighting="none",
             title="Palpate",
         )
         base, *self._views = self.plotter.renderers
@@ -208,7 +210,8 @@ def _draw(plotter: pyvista.Plotter, scene: Scene) -> None:
         path = read_recording(embedded_recording(scene.source)).position[::EVERY]
         plotter.add_points(path, color=COLOURS["object"], point_size=2.0)
     else:
-        look: dict[str, Any] = {"smooth_shading": True, "split_sharp_edges": True, "ambient": 0.2}
+        add_lights(plotter)
+        look: dict[str, Any] = {"smooth_shading": True, "split_sharp_edges": True, **SKIN}
         plotter.add_mesh(surface, color=COLOURS["object"], **look)
     plotter.camera_position = "xz"
     plotter.camera.elevation = 30.0

@@ -27,7 +27,7 @@ from palpate.window.keys import Orbit
 from palpate.window.known import KnownSoFar
 from palpate.window.mouse_and_keys import Controls
 from palpate.window.panel import NextStep, aside_rows, main_rows
-from palpate.window.picture import ObjectPicture
+from palpate.window.picture import ObjectPicture, add_lights
 from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
@@ -40,8 +40,6 @@ SIZE = (1280, 800)
 COLUMN, CHARTS = 280, 190
 """Width of the columns beside the pictures and height of the plots, pixels of a window of full size."""
 LEAST_SCALE, MOST_SCALE = 0.55, 2.5
-LIGHTS = (((-0.4, 0.55, 1.0), 0.9), ((0.9, -0.1, 0.6), 0.45))
-"""Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
 
 
 class TouchWindow:
@@ -139,9 +137,7 @@ class TouchWindow:
 
     def _picture(self, side: int, name: str) -> ObjectPicture:
         self.plotter.subplot(0, side)
-        for place, strength in LIGHTS:
-            light = pyvista.Light(position=place, light_type="camera light", intensity=strength)
-            self.plotter.add_light(light, only_active=True)
+        add_lights(self.plotter)
         session = self.session
         drawing, radius = session.drawing(name), session.servo.tip_radius_m
         return ObjectPicture(

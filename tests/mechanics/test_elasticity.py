@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
@@ -206,3 +210,16 @@ def test_a_solver_has_the_stiffness_of_what_is_free(box):
         expected = whole[np.ix_(solver.free, solver.free)]
         assert np.abs(solver.matrix.toarray() - expected).max() < 1e-14 * np.abs(expected).max()
         assert np.abs(expected - expected.T).max() < 1e-14 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("said", "taken"), [(None, "0"), ("50", "50")])
+def test_threads_of_the_factorisation_wait_without_work_of_the_processor(said, taken):
+    """A thirteenth of the demo's time of the processor was spent in waiting, which slowed what ran beside."""
+    code = (
+        "import os\nfrom palpate.mechanics.elastic import pardiso\n"
+        "pardiso.available()\nprint(os.environ['KMP_BLOCKTIME'])"
+    )
+    given = {key: value for key, value in os.environ.items() if key != "KMP_BLOCKTIME"}
+    environment = given if said is None else given | {"KMP_BLOCKTIME": said}
+    told = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert told.stdout.strip() == taken

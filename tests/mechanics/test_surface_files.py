@@ -428,3 +428,19 @@ def test_labels_of_cells_are_listed_with_their_volumes(tmp_path):
     found = read_surface(tmp_path / "two.vtu", "mm").parts
     assert [p.name for p in found] == ["tissue 1", "tissue 2"]
     assert [p.volume_m3 for p in found] == pytest.approx([6e-5, 6e-5], rel=1e-6)
+
+
+@pytest.mark.parametrize("turned_over", [False, True])
+@pytest.mark.parametrize("lean_deg", [20.0, 70.0])
+def test_an_object_that_leans_is_told_the_way_up_that_does_not_turn_it_over(lean_deg, turned_over):
+    """Of a cylinder's two ends, alike, the top was called its foot: it was stood on its head."""
+    leaning = trimesh.creation.cylinder(0.03, 0.05, sections=64)
+    if turned_over:
+        leaning.apply_transform(trimesh.transformations.rotation_matrix(np.pi, (1, 0, 0)))
+    leaning.apply_transform(trimesh.transformations.rotation_matrix(np.radians(lean_deg), (0.3, 1.0, 0.1)))
+    with pytest.raises(SurfaceError, match="its flat foot is for --up=") as refused:
+        standing(surface_of(leaning))
+    up = str(refused.value).split("--up=")[1].split(";")[0]
+    assert direction(up)[2] == pytest.approx(np.cos(np.radians(lean_deg)), abs=0.03)
+    stood = standing(surface_of(leaning), up=up)
+    assert stood.support_normal @ direction(up) == pytest.approx(1.0, abs=1e-3)

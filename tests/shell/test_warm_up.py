@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from palpate import cli, warm_up
+from palpate import cli, demo, warm_up
 from palpate.mechanics.errors import ContactError
 from palpate.operations.demo import MEANWHILE
 
@@ -54,3 +57,32 @@ def test_the_demo_says_that_its_object_can_be_touched_meanwhile(
         monkeypatch.setattr(sys.stderr, "isatty", lambda there=terminal: there)
         assert cli.main(["demo", "-o", str(tmp_path / "demo")]) == 2
         assert (MEANWHILE in capsys.readouterr().err) == terminal
+
+
+def test_the_demo_waits_for_kernels_only_where_it_feels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It stood still before the diagnosis, which needs none of them, while another core compiled."""
+    done: list[str] = []
+
+    def does(name: str, result: object = None) -> None:
+        monkeypatch.setattr(demo, name, lambda *_, **__: done.append(name) or result)
+
+    @contextmanager
+    def warming_up() -> Iterator[Callable[[], object]]:
+        yield lambda: done.append("compiled")
+
+    monkeypatch.setattr(demo, "warming_up", warming_up)
+    replayed = SimpleNamespace(force_n=None, rmse_n=0.0, force_rms_n=1.0)
+    for name, result in {
+        "read_recording": None,
+        "reconstruct": SimpleNamespace(model=None),
+        "renderer": None,
+        "diagnose": None,
+        "replay": replayed,
+        "run_headless": None,
+    }.items():
+        does(name, result)
+    result = demo.run_demo("REC", tmp_path, demo.DemoOptions())
+    assert done[1:] == ["reconstruct", "renderer", "diagnose", "compiled", "replay", "run_headless"]
+    assert set(result.seconds) == {"reconstruct", "precompute", "diagnose", "replay", "feel at 1 kHz"}

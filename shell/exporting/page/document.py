@@ -74,12 +74,14 @@ def page_of(
     about["opens"] = opens
     about["view"] = [float(np.radians(AZIMUTH_DEG)), float(np.radians(ELEVATION_DEG))]
     table_title, table = _table(renderer)
-    one_d = f'<li><i class="one-d"></i>1D model ({renderer_words(ONE_D)})</li>'
+    about["one_d_words"] = renderer_words(ONE_D)
+    one_d = f'<li><i class="one-d"></i>{about["one_d_words"]}</li>'
     filled = {
         "name": html.escape(title or model.name),
         "summary": html.escape(task and f"{task} ") + _summary(model),
         "style": style_sheet() + file("page.css"),
         "picture": _picture(model),
+        "felt": renderer_words("fem"),
         "one_d": one_d if about["one_d"] else "",
         "table_title": table_title,
         "table": table,
@@ -157,8 +159,8 @@ def _table(renderer: FemRenderer) -> tuple[str, str]:
         "",
         "depth [mm]",
         f"{word} [N]",
-        "finite elements [N]",
-        "1D model [N]",
+        f"{renderer_words('fem')} [N]",
+        f"{renderer_words(ONE_D)} [N]",
         "at x, y, z [mm]",
     )
     rows = []

@@ -223,7 +223,7 @@ class Drawing {
       gl.disable(gl.BLEND);
       const pull = size(scene.force);
       if (!scene.hover && pull > 1e-3) {
-        const way = times(scene.force, 1 / pull), long = pull * scene.newton_m, head = Math.min(0.4 * long, radius * 1.3);
+        const way = times(scene.force, 1 / pull), long = Math.min(pull * scene.newton_m, 0.6 * view.size), head = Math.min(0.4 * long, radius * 1.3);
         const paint = [...linear(colours.fem), 1], side = plus(tip, plus(view.right, up, 0), radius * 1.35);
         part(this.parts.rod, standing(side, way, radius * 0.34, Math.max(long - head, 1e-5)), paint);
         part(this.parts.cone, standing(plus(side, way, Math.max(long - head, 0)), way, head * 0.42, head), paint);

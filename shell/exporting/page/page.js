@@ -17,7 +17,10 @@ class PressPage extends SeenTip {
     $("reset").addEventListener("click", () => { this.camera.reset(); this.dirty = true; });
     $("colour").addEventListener("change", () => this.colour($("colour").checked));
     for (const row of document.querySelectorAll("[data-at]")) {
-      row.addEventListener("click", () => this.tryPress(row.dataset.at.split(",").map(Number), this.wanted));
+      row.addEventListener("click", () => {
+        this.pressInSight(row.dataset.at.split(",").map(Number));
+        stage.scrollIntoView({ block: "nearest" });
+      });
     }
     if (navigator.hid) {
       $("connect").hidden = false;
@@ -176,7 +179,13 @@ class PressPage extends SeenTip {
 
   goToPress(by) {
     this.number = ((this.number ?? (by > 0 ? -1 : 0)) + by + this.dots.length) % this.dots.length;
-    this.tryPress(this.dots[this.number], this.wanted);
+    this.pressInSight(this.dots[this.number]);
+  }
+
+  // A press at a place of the table, which may lie on the far side.
+  pressInSight(at) {
+    this.tryPress(at, this.wanted);
+    if (this.first && dot(this.first.normal, this.camera.back) < 0.2) this.faceTip();
   }
 
   tryPress(at, depth) {

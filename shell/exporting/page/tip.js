@@ -5,6 +5,7 @@ const SLOW_MS = 34; // a frame that takes longer is drawn with fewer pixels
 const $ = (name) => document.getElementById(name);
 const about = JSON.parse($("about").textContent);
 const mm = (m, digits = 1) => (1e3 * m).toFixed(digits);
+const NOT_YET = [...$("parts").children].map((each) => each.textContent);
 const newtons = (n) => (Math.abs(n) < 9.995 ? n.toFixed(2) : n.toFixed(1));
 
 class SeenTip {
@@ -97,7 +98,7 @@ class SeenTip {
     Object.assign(this, { greeting: null, place: null, depth: 0, goal: 0, trail: [], peak: null, dirty: true });
     this.touch.release();
     for (const [name, words] of [["force", "– N"], ["band", ""]]) $(name).textContent = words;
-    this.parts(["not pressed yet"]);
+    this.parts(NOT_YET);
   }
 
   // A straight press at once, as a link, the table or a script asks for it.
@@ -204,12 +205,10 @@ class SeenTip {
     return this.dots_ ??= Array.from({ length: about.presses.count }, (_, i) => [...this.presses.points.slice(3 * i, 3 * i + 3)]);
   }
 
-  // About the greatest force that this page shows, N: the arrow's scale.
+  // The force of the deepest press on the top, N: the arrow's scale. At the foot forces are many times as great.
   get strongest() {
-    return this.strongest_ ??= Math.max(...[0, 0.25, 0.5, 0.75].map((share) => {
-      const v = Math.floor(share * this.surface.vertices.length / 3);
-      return this.tables.response_([v, v, v], [1, 0, 0], this.tables.most)[0] * this.tables.most;
-    }));
+    const { triangle, weights } = this.topPlace(), corners = this.surface.triangles.subarray(3 * triangle, 3 * triangle + 3);
+    return this.strongest_ ??= this.tables.response_(corners, weights, this.tables.most)[0] * this.tables.most;
   }
 
   nearestPress(point) {
@@ -252,7 +251,7 @@ class SeenTip {
       $("force").textContent = `${newtons(size(touch.force))} N`;
       $("band").textContent = `± ${newtons(Math.max(bandOf(tables, touch), 0.005))} N`;
       const parts = [`${mm(touch.depth)} mm deep`, `${newtons(touch.normalForce)} N inwards`, `${newtons(sideways)} N sideways${touch.slipping ? ", sliding" : ""}`];
-      if (tables.oneD) parts.push(`1D model: ${newtons(tables.oneDForce(touch.corners, touch.place.weights, touch.depth))} N`);
+      if (tables.oneD) parts.push(`${about.one_d_words}: ${newtons(tables.oneDForce(touch.corners, touch.place.weights, touch.depth))} N`);
       this.parts(parts);
     } else if (this.peak) {
       $("force").textContent = `${newtons(this.peak.pull)} N`;

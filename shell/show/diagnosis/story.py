@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.apply import improved
-from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.diagnosis.verdict.result import Diagnosis, parted
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.model import Model
 from palpate.show import story as say
@@ -32,7 +32,6 @@ from palpate.show.diagnosis.words import (
     meaning,
     missing,
     named,
-    touch_parts,
     touch_words,
     verdict,
     where,
@@ -149,7 +148,8 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
     if not asked:
         yield feel_step(model.path, f"palpate reconstruct {recording} -o MODEL")
     if result.next_touch is not None and result.unsettled:
-        yield f"make the next touch that is described here: it is to tell {touch_parts(result.next_touch)}"
+        told = parted(result.next_touch.separates)
+        yield f"make the next touch that is described here: it is to tell {told}"
 
 
 def _caption(result: Diagnosis) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from palpate.diagnosis.verdict.result import Diagnosis, NextTouch
+from palpate.diagnosis.verdict.result import Diagnosis, parted
 from palpate.mechanics.effects.base import Scope
 from palpate.mechanics.effects.registry import effect
 from palpate.show.diagnosis.gaps import depth_contrast, in_model, press_gaps, worst_press
@@ -242,23 +242,17 @@ def short_verdict(kind: str, effects: Sequence[str], candidates: Sequence[str]) 
     return listed(said) or kind
 
 
-def touch_parts(touch: NextTouch) -> str:
-    """'A from B': what the next touch separates, of candidates or, where nothing known explains the gap, of
-    what comes nearest to it."""
-    return " from ".join(map(spaced, touch.separates))
-
-
 def touch_words(result: Diagnosis) -> str:
     """Where and how to touch next, and what that would tell."""
     touch = result.next_touch
     assert touch is not None
-    parted = touch_parts(touch)
+    told = parted(touch.separates)
     if touch.kind != "press":
-        return f"to separate {parted}: {touch.why}"
+        return f"to separate {told}: {touch.why}"
     direction = ", ".join(f"{round(d, 2) + 0.0:g}" for d in touch.direction)
     hold = f", and hold for {touch.hold_s:.1f} s" if touch.hold_s > 0.05 else ""
     return (
-        f"to separate {parted}, press at {place_mm((touch.x, touch.y, touch.z))} in the direction "
+        f"to separate {told}, press at {place_mm((touch.x, touch.y, touch.z))} in the direction "
         f"({direction}), "
         f"{mm(touch.depth_m, '.1f')} deep at {mm(touch.speed_m_per_s, '.0f')}/s{hold}: {touch.why}"
     )

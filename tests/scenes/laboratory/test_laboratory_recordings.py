@@ -147,7 +147,9 @@ def test_frame_turns_everything_together(springs) -> None:
     assert turned.clean_n @ rotation == pytest.approx(plain.clean_n, abs=1e-9)
 
 
-def test_sealed_recording_withholds_the_truth_and_the_seal_finds_changes(springs, tmp_path: Path) -> None:
+def test_sealed_recording_withholds_the_truth_and_the_seal_finds_changes(
+    springs, tmp_path: Path, capsys
+) -> None:
     record, truth = tmp_path / "case.csv.gz", tmp_path / "vault" / "case.json"
     arguments = [
         "simulate",
@@ -160,6 +162,7 @@ def test_sealed_recording_withholds_the_truth_and_the_seal_finds_changes(springs
         "sparse",
     ]
     assert main([*arguments, "--seal", "--truth", str(truth)]) == 0
+    assert f"palpate reconstruct {record} -o MODEL" in capsys.readouterr().out
     recording = read_recording(record)
     assert recording.truth is None and "delay" not in (tmp_path / "case.toml").read_text()
     seal = tmp_path / "case.sealed"

@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +16,7 @@ import pytest
 
 import palpate as pp
 from palpate.devices.codecs import spacemouse
-from palpate.exporting.page.contents import force_band, shown_modes
+from palpate.exporting.page.contents import ONE_D, force_band, shown_modes
 from palpate.exporting.page.document import button, page_of
 from palpate.exporting.page.tables import first_depth, modes_of
 from palpate.mechanics.effects.registry import effect
@@ -25,6 +26,7 @@ from palpate.render.fem.renderer import FemRenderer
 from palpate.render.press import Stroke, press, read_curve
 from palpate.render.scene import in_the_air
 from palpate.scenes.scene import FIND_M, load_scene
+from palpate.words import renderer_words
 
 from ..show import browser
 
@@ -248,6 +250,26 @@ def test_a_page_presses_first_as_deep_as_the_game_asks_and_less_into_what_is_thi
 
 
 @needs_browser
+def test_a_press_of_the_table_is_seen_wherever_it_lies(tab):
+    """Of a place on the far side the tip stayed behind the object, and the picture above the screen."""
+    rows = tab.evaluate("document.querySelectorAll('[data-at]').length")
+    for row in range(rows):
+        tab.evaluate(f"document.querySelectorAll('[data-at]')[{row}].click()")
+        towards = "palpate.page.first.normal.reduce((sum, n, i) => sum + n * palpate.page.camera.back[i], 0)"
+        assert tab.evaluate(towards) > 0.1
+        stage = "document.getElementById('stage').getBoundingClientRect()"
+        assert tab.evaluate(f"{stage}.bottom > 0 && {stage}.top < innerHeight")
+
+
+@needs_browser
+def test_the_forces_arrow_is_long_enough_to_be_seen(tab):
+    """Its scale was that of the stiffest corner, at the foot: of a usual press it was a dot."""
+    tab.evaluate("palpate.page.begin(palpate.page.topPlace(), true)")
+    tab.wait("palpate.page.depth === palpate.page.goal && palpate.page.touch.normalForce > 0.05")
+    assert tab.evaluate("0.5 * palpate.page.touch.normalForce / palpate.page.strongest") > 0.08
+
+
+@needs_browser
 def test_the_slider_stands_at_the_first_depth(tab, renderer):
     assert state(tab, "wanted") == pytest.approx(first_depth(renderer.model))
 
@@ -258,7 +280,9 @@ def test_the_tip_shows_once_what_it_does_unless_less_motion_is_liked(tab, writte
     opened(tab, written, lively=True)
     tab.wait("palpate.page.touch.normalForce > 0.1")
     tab.wait("palpate.page.greeting === null && !palpate.page.touch.touching")
-    assert tab.evaluate("document.getElementById('parts').textContent") == "not pressed yet"
+    assert (
+        tab.evaluate("document.getElementById('parts').textContent") == "not pressed yet curves: at its top"
+    )
     assert tab.evaluate("document.getElementById('copy').disabled"), "nobody pressed"
     opened(tab, written, lively=True)
     tab.wait("palpate.page.touch.normalForce > 0.1")
@@ -504,3 +528,13 @@ def test_a_page_of_a_hidden_nodule_names_the_task(renderer, monkeypatch, tmp_pat
     head = page.partition("<h1>")[2].partition("<canvas")[0]
     assert "nodule" in head.partition("</h1>")[0] and f"{1e3 * FIND_M:g} mm" in head
     assert not load_scene("demo").task
+
+
+def test_whatever_is_drawn_on_the_page_is_named_on_it_as_the_window_names_it(written):
+    """Red dots had no name; one model was 'finite elements' here and 'this model' in the window."""
+    page = written.read_text(encoding="utf-8")
+    legend = re.search(r'<ul class="legend">.*?</ul>', page, re.DOTALL)[0]
+    assert '<i class="place"></i>places of' in legend
+    for name in ("fem", ONE_D):
+        assert renderer_words(name) in legend and f"{renderer_words(name)} [N]</th>" in page
+    assert "finite elements" not in legend and "1D model" not in legend

@@ -136,6 +136,16 @@ def test_what_completes_an_exploration_is_waved_and_traced_as_it_is_asked_for(gu
     assert guide.suggestion.kind == "stop"
 
 
+def test_what_a_sliding_tip_met_is_not_told_as_presses_that_failed(guided):
+    """ "no shape yet: 0 of 22 contacts are usable presses" stood there before the first press."""
+    guide, *_ = guided
+    trouble = "0 of 22 contacts are usable presses (lasts only 6 ms: 22)"
+    guide.state = SimpleNamespace(surface="", made=0, trouble=trouble)
+    assert guide.lines()[1] == "0 of the 4 presses that show a shape"
+    guide.state.made = 5
+    assert guide.lines()[1] == "no shape yet: 0 of 22 contacts are usable presses"
+
+
 def test_the_ghost_stands_a_tips_radius_above_the_place(guided):
     guide, servo, explorer, tracing = guided
     tracing.done = True
