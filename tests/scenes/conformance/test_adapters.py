@@ -60,7 +60,8 @@ class _Sofa(types.ModuleType):
 
     def __init__(self, points: np.ndarray) -> None:
         super().__init__("Sofa")
-        self.points, self.made = points, []
+        self.points = points
+        self.made: list[tuple[str, dict[str, object]]] = []
         self.Core = types.SimpleNamespace(Node=lambda name: self)
         self.Simulation = types.SimpleNamespace(init=lambda root: None, animate=lambda root, dt: None)
 
