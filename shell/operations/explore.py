@@ -157,7 +157,7 @@ _TAKES = {
 def _refuse_idle(who: str, said: Mapping[str, Any]) -> None:
     """Raise OptionError for what would be said in vain: another kind of exploration takes it."""
     for name in (name for name, value in said.items() if value is not None and name not in _TAKES[who]):
-        flag = flag_of(explore.operation.fields[name])
+        flag = flag_of(explore.operation.fields[name])  # type: ignore[attr-defined]
         others = " or ".join(each for each, names in _TAKES.items() if name in names)
         raise OptionError(f"{flag} goes with {others}, not with {who}")
 
