@@ -55,7 +55,7 @@ def advice_of(
     for name in real:
         said.append(
             f"{name.replace('_', ' ')}: no setting of an ideal elastic simulation contains it; "
-            "'palpate diagnose REC --apply MODEL2' writes a model that does"
+            "'palpate diagnose REC --model MODEL --apply MODEL2' writes a model that does"
         )
     return tuple(said)
 

@@ -39,7 +39,9 @@ class SimulateOptions:
     force_noise_std_n: float = option(0.012, "sensor noise, standard deviation per axis", unit="N")
     coloured_share: float = option(0.15, "share of the noise's power below 10 Hz, 0 to 1")
     position_resolution_m: float = option(3.0e-5, "step of the position reading", unit="m")
-    frame: bool = option(False, "turn and shift the device frame at random (else the object's frame)")
+    frame: bool = option(
+        False, "turn and shift the device frame at random (else the base's middle is the origin)"
+    )
     relaxation: str = option(
         "quasi-linear",
         "viscoelasticity: a law on the elastic force, or solved in the solid for every touch",

@@ -250,7 +250,8 @@ def _applied(own: Diagnosis, into: str) -> list[str]:
     kept = [name for name in own.effects if name in better.effects]
     before, after = (f"{1e3 * gap:.3g} mN" for gap in (found.given_n, found.improved_n))
     return [
-        f"improved model ({', '.join(kept) or 'modulus only'}): {into}",
+        f"improved model ({', '.join(kept) or 'modulus only'}; Young's modulus "
+        f"{better.material.young_modulus_pa / 1e3:.4g} kPa): {into}",
         f"  replayed over the recording its force is {after} off, the given model's {before}",
         *([f"  {unsettled_words(found.unsettled, found.samples)}"] if found.unsettled else []),
         *(
