@@ -267,6 +267,10 @@ def verdict(result: Comparison) -> str:
         words += f"; a 1D model wins in {', '.join(lost)}"
     elif not any(wins.values()):
         words += "; a 1D model wins nowhere here"
+    renderer = result.recording and (result.recording.truth or {}).get("renderer")
+    if renderer:
+        words += f"; the forces were rendered ({renderer}), not measured"
+        words += ": FEM is held against itself" if renderer == "fem" else ""
     return words
 
 

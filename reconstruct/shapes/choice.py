@@ -173,7 +173,7 @@ def reason(best: Explained, tried: list[Explained]) -> str:
     if others:
         second = max(others, key=score)
         error = 1e3 * held_out_error(second)
-        text += f" (the next best shape, {second.name}: {error:.2f} mm)"
+        text += f" (next likeliest: {second.name}, {error:.2f} mm)"
     return text
 
 

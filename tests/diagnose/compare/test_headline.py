@@ -22,6 +22,18 @@ from palpate.diagnosis.compare.comparison import verdict
 def test_what_errs_alike_is_not_said_to_err_less(fem_n, said):
     """ "FEM errs 1.0 times less" stood where both err alike."""
     errors = {"fem": fem_n, "kelvin-voigt": 0.2, "hunt-crossley": 0.1}
-    result = SimpleNamespace(rmse_n=errors, regions=(), presses=range(9), wins=lambda name: 3)
+    result = SimpleNamespace(rmse_n=errors, regions=(), presses=range(9), wins=lambda name: 3, recording=None)
     words = verdict(result)
     assert words.startswith(said) and "1.0 times" not in words
+
+
+def test_forces_that_were_rendered_are_said_to_be():
+    """A touch that was recorded on a model, compared, read "FEM errs 7.3 times less": than itself."""
+    errors = {"fem": 0.01, "kelvin-voigt": 0.2, "hunt-crossley": 0.1}
+    recording = SimpleNamespace(truth={"renderer": "fem"})
+    result = SimpleNamespace(
+        rmse_n=errors, regions=(), presses=range(9), wins=lambda name: 3, recording=recording
+    )
+    assert "not measured: FEM is held against itself" in verdict(result)
+    recording.truth = {"simulator": "palpate virtual laboratory"}
+    assert "rendered" not in verdict(result)
