@@ -14,10 +14,9 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
 from palpate.mechanics.compliance.near_field import contact_width
-from palpate.mechanics.compliance.patch import usual_width
 from palpate.mechanics.compliance.sites import (
-    PATCH_WIDTH_IN_EDGES,
     contact_curvature,
+    patch_width,
     surface_edge,
     uneven_curvature,
 )
@@ -171,8 +170,7 @@ def _coarsely(renderer: FemRenderer, points: np.ndarray, tip_radius_m: float) ->
     """(k,) rims within a patch's reach, times the tip's radius over the patch's width; none where elements
     are as fine as touches ask for: there rims are made up for (mechanics.contact.edges)."""
     mesh, width = renderer.model.mesh, float(renderer.compliance.own_width_m[0])
-    asked = max(usual_width(mesh), PATCH_WIDTH_IN_EDGES * surface_edge(mesh))
-    excess = max(0.0, 1 - asked / width)
+    excess = max(0.0, 1 - patch_width(mesh, surface_edge(mesh)) / width)
     return (
         excess * tip_radius_m / width * ends_within(mesh, points, width) if excess else np.zeros(len(points))
     )

@@ -14,6 +14,7 @@ import dataclasses
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -67,11 +68,11 @@ class Own:
     def without(self, force: np.ndarray, stated: Stated) -> np.ndarray:
         """(n, 3) N that our law would have: the simulator's force (n, 3) N without what is its own."""
         level = self._level(stated)
-        return level * (self._read(force / level) + self.law - self._read(self.base))
+        return level * (self._read(force / level) + self.law - self._read_base)
 
     def times(self) -> np.ndarray:
         """(n, 1) how many times our law's force the simulator's is."""
-        read = np.linalg.norm(self._read(self.base), axis=1)
+        read = np.linalg.norm(self._read_base, axis=1)
         size = np.linalg.norm(self.base, axis=1)
         return np.where(read > 0, size / np.maximum(read, 1e-12), 1.0)[:, None]
 
@@ -81,6 +82,10 @@ class Own:
 
     def _level(self, stated: Stated) -> float:
         return stated.young_modulus_pa / self.stated.young_modulus_pa
+
+    @cached_property
+    def _read_base(self) -> np.ndarray:
+        return self._read(self.base)
 
     def _read(self, force: np.ndarray) -> np.ndarray:
         """(n, 3) N of our law where the base has this force; beyond its greatest, in proportion."""

@@ -122,12 +122,13 @@ def surface_edge(mesh: TetMesh) -> float:
     return min(SURFACE_EDGE_M, _EDGE_IN_WIDTHS * usual_width(mesh))
 
 
-def patch_width(mesh: TetMesh) -> float:
+def patch_width(mesh: TetMesh, edge_m: float | None = None) -> float:
     """The width, m, of the patch of a touch on a quadratic mesh: the same for every mesh of an object.
 
-    The usual one, but at least the 0.8 edges of the surface that the elements resolve.
+    The usual one, but at least the 0.8 edges of the surface that the elements resolve. edge_m: of a surface
+    of that object whose edges are as long; None: the mesh's own.
     """
-    return max(PATCH_WIDTH_IN_EDGES * typical_edge(mesh), usual_width(mesh))
+    return max(PATCH_WIDTH_IN_EDGES * (edge_m or typical_edge(mesh)), usual_width(mesh))
 
 
 def load_width(solver: Solver, tip_radius_m: float = USUAL_TIP_RADIUS_M) -> float:

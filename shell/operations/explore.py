@@ -25,7 +25,7 @@ from palpate.diagnosis.explore.segments import Instrument
 from palpate.diagnosis.explore.suggestion import Explored
 from palpate.mechanics.errors import DeviceError, OptionError
 from palpate.mechanics.options import check_ranges, flag_of
-from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
+from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from palpate.mechanics.recording.recording import read_recording
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, operation, option
@@ -120,7 +120,7 @@ def explore(
         "young_modulus_pa": young_modulus_pa, **file, **errors,
     }  # fmt: skip
     _refuse_idle("--robot" if robot else "--device" if device else "--phantom", said)
-    tip_radius_m = 0.005 if tip_radius_m is None else tip_radius_m
+    tip_radius_m = USUAL_TIP_RADIUS_M if tip_radius_m is None else tip_radius_m
     if robot:
         result = _by_robot(begun, output, rate_hz, tip_radius_m, poisson_ratio)
     elif device:
