@@ -2,10 +2,10 @@
 
 Every law is a table over x = delta / R of four numbers, with E* = E / (1 - nu^2), G = E / (2 (1 + nu)):
     normal force        E* R^2 c(x) (1 + k R g(x)) x^1.5    (k: mean curvature of the surface)
-    contact radius      R alpha(x) x^0.5
-    sideways stiffness  8 G / (2 - nu) R tau(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) where tau =
-    alpha; tau / alpha is what the strain of a deep dent makes every ring of the contact stiffer by)
-Hertz is c = 4/3, alpha = tau = 1, g = 0. A tip that slips is pushed back less, the deeper the more: c falls
+    contact radius      a = R alpha(x) x^0.5
+    sideways stiffness  8 G / (2 - nu) a grip(x)    (stick; Mindlin's 8 G a / (2 - nu) where grip = 1; the
+    strain of a deep dent makes every ring of the contact stiffer by it)
+Hertz is c = 4/3, alpha = grip = 1, g = 0. A tip that slips is pushed back less, the deeper the more: c falls
 with Coulomb's friction (`slipping`). On a curved surface R is the effective radius, which is Hertz's
 answer for a small contact; g is what a deep one on a bump or in a hollow has beyond it. One numba kernel
 reads them all, so a new law is a new table.
@@ -44,8 +44,8 @@ GRIPS = 0.7
 
 @dataclass(frozen=True)
 class DentLaw:
-    """A named law: table (n, 4) of c, alpha, tau, g at x = 0 to DEPTH_LIMIT in equal steps; its source in
-    words."""
+    """A named law: table (n, 5) of c, alpha, grip, g and the slope of grip against x, at x = 0 to DEPTH_LIMIT
+    in equal steps; its source in words."""
 
     name: str
     table: np.ndarray
@@ -61,13 +61,12 @@ class DentLaw:
         _dent_forces(self.table, depth, float(tip_radius_m), float(plane_strain), force)
         return force
 
-    def scaled(self, c: np.ndarray | float, tau: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
-        """The law with c and tau multiplied by factors, one or one a row of `grid()`."""
-        table = self.table.copy()
-        table[:, 0] *= c
-        table[:, 2] *= tau
-        table.setflags(write=False)
-        return DentLaw(name or self.name, table, self.source)
+    def scaled(self, c: np.ndarray | float, grip: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
+        """The law with c and grip multiplied by factors, one or one a row of `grid()`."""
+        own = self.table
+        return DentLaw(
+            name or self.name, _table(own[:, 0] * c, own[:, 1], own[:, 2] * grip, own[:, 3]), self.source
+        )
 
 
 @lru_cache(maxsize=64)
@@ -78,14 +77,20 @@ def dent_law(
     one."""
     if name not in _LAWS:
         raise OptionError(f"'{name}' is no dent law; allowed are {', '.join(_LAWS)}")
-    table, source = _LAWS[name](poisson_ratio)
-    bent = np.zeros(len(table))
+    (c, alpha, tau), source = _LAWS[name](poisson_ratio)
+    bent = np.zeros(len(c))
     if name in _FOLLOWED:
         bent = _beyond_hertz()
-        table[:, 0] *= slipping(name, poisson_ratio, friction)
-    table = np.column_stack([table, bent])
+        c = c * slipping(name, poisson_ratio, friction)
+    # coarse elements make the first rows of a table waver; what holds never softens as the tip goes in
+    return DentLaw(name, _table(c, alpha, np.maximum.accumulate(tau / alpha), bent), source)
+
+
+def _table(c: np.ndarray, alpha: np.ndarray, grip: np.ndarray, g: np.ndarray) -> np.ndarray:
+    """(n, 5) of a law, read only."""
+    table = np.column_stack([c, alpha, grip, g, np.gradient(grip, DEPTH_LIMIT / _STEPS)])
     table.setflags(write=False)
-    return DentLaw(name, table, source)
+    return table
 
 
 def slipping(name: str, poisson_ratio: float, friction: float) -> np.ndarray:
@@ -103,7 +108,7 @@ def slipping(name: str, poisson_ratio: float, friction: float) -> np.ndarray:
     if name != "linear":
         return kept
     slips = (1 - kept) / np.maximum(1 - share[0], 1e-9)
-    return 1 - slips * np.maximum(1 - _sphere()[0][:, 0] / _tabulated(name, poisson_ratio)[0][:, 0], 0.0)
+    return 1 - slips * np.maximum(1 - _sphere()[0][0] / _tabulated(name, poisson_ratio)[0][0], 0.0)
 
 
 @lru_cache(maxsize=1)
@@ -128,7 +133,8 @@ def grid() -> np.ndarray:
 
 
 def _hertz() -> tuple[np.ndarray, str]:
-    return np.tile([4 / 3, 1.0, 1.0], (_STEPS + 1, 1)), "Hertz 1882: paraboloid, a << R"
+    """(3, n) c, alpha and tau = alpha grip, and their source; so are the others."""
+    return np.outer([4 / 3, 1.0, 1.0], np.ones(_STEPS + 1)), "Hertz 1882: paraboloid, a << R"
 
 
 @lru_cache(maxsize=1)
@@ -140,7 +146,7 @@ def _sphere() -> tuple[np.ndarray, str]:
     force = (a * a + 1) / 2 * log - a
     x = grid()
     c, alpha = (np.interp(x, depth, y) for y in (force / depth**1.5, a / np.sqrt(depth)))
-    return np.stack([c, alpha, alpha], axis=1), "Sneddon 1965: exact profile of a sphere, frictionless"
+    return np.stack([c, alpha, alpha]), "Sneddon 1965: exact profile of a sphere, frictionless"
 
 
 def _tabulated(name: str, poisson_ratio: float) -> tuple[np.ndarray, str]:
@@ -160,7 +166,7 @@ def _read(name: str, poisson_ratio: float) -> np.ndarray:
     suffix = "" if usual else f"_{poisson_ratio:.2f}"
     path = Path(__file__).with_name(f"dent_{name.replace('-', '_')}{suffix}.csv")
     x, *columns = np.loadtxt(path, delimiter=",", unpack=True)
-    return np.stack([np.interp(grid(), x, y) for y in columns], axis=1)
+    return np.stack([np.interp(grid(), x, y) for y in columns])
 
 
 @lru_cache(maxsize=1)
@@ -185,10 +191,10 @@ _LAWS: dict[str, Callable[[float], tuple[np.ndarray, str]]] = {
 
 @kernel
 def dent_force(table, depth, radius, bend, plane_strain_modulus):
-    """(force N, stiffness N/m, contact radius R alpha x^0.5 m, tau / alpha) at an indentation, m; zeros where
-    it is not positive. radius: effective, m. bend: mean curvature of the surface times the tip's radius."""
+    """(force N, stiffness N/m, contact radius m, grip, its slope 1/m) at an indentation, m; zeros where it is
+    not positive. radius: effective, m. bend: mean curvature of the surface times the tip's radius."""
     if not depth > 0.0:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     x = depth / radius
     last = table.shape[0] - 1
     step = DEPTH_LIMIT / last
@@ -196,7 +202,8 @@ def dent_force(table, depth, radius, bend, plane_strain_modulus):
     i = int(position)
     slope = 0.0
     if i >= last:
-        c, alpha, tau = table[last, 0] * (1.0 + bend * table[last, 3]), table[last, 1], table[last, 2]
+        c, alpha, grip = table[last, 0] * (1.0 + bend * table[last, 3]), table[last, 1], table[last, 2]
+        stiffens = 0.0
     else:
         f = position - i
         low = table[i, 0] * (1.0 + bend * table[i, 3])
@@ -204,18 +211,19 @@ def dent_force(table, depth, radius, bend, plane_strain_modulus):
         slope = (high - low) / step
         c = low + f * (high - low)
         alpha = table[i, 1] + f * (table[i + 1, 1] - table[i, 1])
-        tau = table[i, 2] + f * (table[i + 1, 2] - table[i, 2])
+        grip = table[i, 2] + f * (table[i + 1, 2] - table[i, 2])
+        stiffens = table[i, 4] + f * (table[i + 1, 4] - table[i, 4])
     root = np.sqrt(x)
     force = plane_strain_modulus * radius * radius * c * x * root
     stiffness = plane_strain_modulus * radius * (1.5 * c * root + slope * x * root)
-    return force, stiffness, radius * alpha * root, tau / alpha
+    return force, stiffness, radius * alpha * root, grip, stiffens / radius
 
 
 @kernel
 def _dent_forces(table, depth, radius, plane_strain_modulus, force):
     """`dent_force` of indentations (k,) of a plane, into force (k,) N."""
     for i in range(len(depth)):
-        force[i], _, _, _ = dent_force(table, depth[i], radius, 0.0, plane_strain_modulus)
+        force[i], _, _, _, _ = dent_force(table, depth[i], radius, 0.0, plane_strain_modulus)
 
 
 def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> float | np.ndarray:

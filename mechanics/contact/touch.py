@@ -5,8 +5,9 @@ object,
     d = dent(F) + far F / E,
 with the normal dent after a law of mechanics.contact.dent and a tangential stick: every ring of the contact
 circle holds the place where it first touched (method of dimensionality reduction with sticking springs, Popov
-& Hess 2015, equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go.
-Unilateral, no adhesion.
+& Hess 2015, equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go. Rings that
+stiffen as the dent deepens push the tip out by the slope of the energy that they hold, or stretching shallow
+and letting go deep would make energy. Unilateral, no adhesion.
 
 The local frame has the normal first (mechanics.frames): n outward, then the tangents u and v.
 
@@ -30,55 +31,62 @@ from palpate.mechanics.kernels import kernel
 
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
 _SLOW = 24  # turns after which the dent is sought by secants
-STATE_SIZE = 4 + 3 * _RINGS
-"""state[0]: rings held; [1]: dent along -n, m; [2:4]: tangential dent, m; then (radius, cumulated origin)."""
+STATE_SIZE = 4 + 4 * _RINGS
+"""state[0]: rings held; [1]: dent along -n, m; [2:4]: tangential dent, m; then of each ring its radius and
+the integrals, over the radius and up to it, of the origin and of its square."""
 
 
 @kernel
 def _origin_integral(state, a):
-    """Integral over the radius 0..a of the tangential origin of each ring, for a within what is held."""
+    """Integrals over the radius 0..a of the tangential origin of each ring, m^2, and of its square, m^3, for
+    a within what is held; the ring's number before."""
     count = int(state[0])
     low, high = 0, count - 1
     while low < high:
         middle = (low + high) // 2
-        if state[4 + 3 * middle] < a:
+        if state[4 + 4 * middle] < a:
             low = middle + 1
         else:
             high = middle
-    end = 4 + 3 * low
-    if low == 0:
-        a0, u0, v0 = 0.0, 0.0, 0.0
-    else:
-        a0, u0, v0 = state[end - 3], state[end - 2], state[end - 1]
+    end = 4 + 4 * low
+    a0, u0, v0, s0 = _up_to(state, low)
     width = state[end] - a0
     f = (a - a0) / width if width > 0.0 else 1.0
-    return low, u0 + f * (state[end + 1] - u0), v0 + f * (state[end + 2] - v0)
+    u, v, square = state[end + 1], state[end + 2], state[end + 3]
+    return low, u0 + f * (u - u0), v0 + f * (v - v0), s0 + f * (square - s0)
+
+
+@kernel
+def _up_to(state, count):
+    """Of the first count rings: radius and integrals; zeros of none."""
+    if count == 0:
+        return 0.0, 0.0, 0.0, 0.0
+    end = 4 * count
+    return state[end], state[end + 1], state[end + 2], state[end + 3]
 
 
 @kernel
 def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
-    """Tangential force and dent for contact radius a: free = d_t - C_tn F_n, stick = k_t / a."""
-    count = int(state[0])
-    top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
-    if a >= top:
-        # the new ring touches half way between the last dent and this one
-        new = a - top
-        mu = (state[5 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * new * state[2]
-        mv = (state[6 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * new * state[3]
-        reach = a - 0.5 * new
-    else:
-        _, mu, mv = _origin_integral(state, a)
-        reach = a
+    """(force u, v, dent u, v, integral of the stretch squared over the radius) for contact radius a: free =
+    d_t - C_tn F_n, stick = k_t / a."""
+    top, mu, mv, square = _up_to(state, int(state[0]))
+    if a < top:
+        _, mu, mv, square = _origin_integral(state, a)
+    held, new = min(a, top), max(a - top, 0.0)
+    # the new ring touches half way between the last dent and this one
+    reach, ou, ov = held + 0.5 * new, mu + 0.5 * new * state[2], mv + 0.5 * new * state[3]
     k = stick * reach
-    bu = free_u + stick * (cuu * mu + cuv * mv)
-    bv = free_v + stick * (cuv * mu + cvv * mv)
+    bu = free_u + stick * (cuu * ou + cuv * ov)
+    bv = free_v + stick * (cuv * ou + cvv * ov)
     m00, m01, m11 = max(1.0 + k * cuu, 1.0 - STIFFEST), k * cuv, max(1.0 + k * cvv, 1.0 - STIFFEST)
     if m01 * m01 > STIFFEST * m00 * m11 and not (cuu >= 0.0 and cuv * cuv <= cuu * cvv):
         m01 = 0.0  # what gives way against a force could turn it unstable; a slender body's own never does
     det = m00 * m11 - m01 * m01
     du = (m11 * bu - m01 * bv) / det
     dv = (m00 * bv - m01 * bu) / det
-    return k * du - stick * mu, k * dv - stick * mv, du, dv
+    of_held = held * (du * du + dv * dv) - 2.0 * (du * mu + dv * mv) + square
+    of_new = new * ((du - state[2]) ** 2 + (dv - state[3]) ** 2) / 3.0
+    return k * du - stick * ou, k * dv - stick * ov, du, dv, max(of_held, 0.0) + of_new
 
 
 @kernel
@@ -90,21 +98,23 @@ def touch_remember(state, dent, a, du, dv, radius):
     state[1] = dent
     thin = radius / 64.0
     count = int(state[0])
-    top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
+    top, u, v, square = _up_to(state, count)
     if a > top:
-        u = (state[5 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * (a - top) * (du + state[2])
-        v = (state[6 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * (a - top) * (dv + state[3])
-        before = state[4 + 3 * (count - 2)] if count > 1 else 0.0
+        u0, v0, new = state[2], state[3], a - top
+        u += 0.5 * new * (du + u0)
+        v += 0.5 * new * (dv + v0)
+        square += new * (du * du + du * u0 + u0 * u0 + dv * dv + dv * v0 + v0 * v0) / 3.0
+        before = _up_to(state, max(count - 1, 0))[0]
         if count == 0 or (top - before >= thin and count < _RINGS):
             count += 1
     elif count > 0:
-        low, u, v = _origin_integral(state, a)
+        low, u, v, square = _origin_integral(state, a)
         count = low + 1
     else:
         return
     state[0] = count
-    end = 4 + 3 * (count - 1)
-    state[end], state[end + 1], state[end + 2] = a, u, v
+    end = 4 * count
+    state[end], state[end + 1], state[end + 2], state[end + 3] = a, u, v, square
     state[2], state[3] = du, dv
 
 
@@ -131,9 +141,10 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
     within = cvv * far[1, 0] ** 2 - 2.0 * cuv * far[1, 0] * far[2, 0] + cuu * far[2, 0] ** 2
     sound = cuu > 0.0 and minor > 0.0 and cnn * minor >= within
     fn = fu = fv = a = held = du = dv = stiffness = compliance = 0.0
-    last_dent = last_excess = 0.0
+    last_dent = last_excess = push = 0.0
     for turn in range(80):
-        fn, stiffness, a, grip = dent_force(table, dent, radius, bend, plane_strain_modulus)
+        dented, stiffness, a, grip, stiffens = dent_force(table, dent, radius, bend, plane_strain_modulus)
+        fn = dented + push
         # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
         # that
         compliance = max(cnn, -STIFFEST / stiffness)
@@ -146,7 +157,10 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
             cun *= np.sqrt(STIFFEST * least / couple)
             cvn *= np.sqrt(STIFFEST * least / couple)
         # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
-        fu, fv, du, dv = _tangential(state, a, stick * grip, cuu, cuv, cvv, d[1] + cun * fn, d[2] + cvn * fn)
+        free_u, free_v = d[1] + cun * fn, d[2] + cvn * fn
+        fu, fv, du, dv, stretch = _tangential(state, a, stick * grip, cuu, cuv, cvv, free_u, free_v)
+        push = 0.5 * stick * stiffens * stretch
+        fn = dented + push
         excess = dent + compliance * fn - cun * fu - cvn * fv - press
         if excess > 0.0:
             high = dent

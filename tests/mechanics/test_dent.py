@@ -53,8 +53,8 @@ def test_stiffness_is_the_slope_of_the_force(name, bend):
 
 
 def test_nothing_without_a_dent():
-    assert dent_force(dent_law("sphere").table, -1e-3, R, 0.0, E) == (0.0, 0.0, 0.0, 0.0)
-    assert dent_force(dent_law("sphere").table, 0.0, R, 0.0, E) == (0.0, 0.0, 0.0, 0.0)
+    assert dent_force(dent_law("sphere").table, -1e-3, R, 0.0, E) == (0.0,) * 5
+    assert dent_force(dent_law("sphere").table, 0.0, R, 0.0, E) == (0.0,) * 5
 
 
 def test_a_bump_answers_a_deep_dent_harder_than_its_effective_radius_says_and_a_hollow_softer():
@@ -74,7 +74,7 @@ def test_finite_strain_is_softer_down_and_stiffer_sideways():
     linear, finite = dent_law("linear"), dent_law("neo-hookean")
     depth = np.array([5e-3])
     assert 0.94 < (finite.force(depth, E, NU, R) / linear.force(depth, E, NU, R))[0] < 0.98
-    sideways = [np.prod(dent_force(law.table, 5e-3, R, 0.0, E)[2:]) for law in (linear, finite)]
+    sideways = [np.prod(dent_force(law.table, 5e-3, R, 0.0, E)[2:4]) for law in (linear, finite)]
     assert 1.15 < sideways[1] / sideways[0] < 1.3
 
 

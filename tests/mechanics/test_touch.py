@@ -49,13 +49,14 @@ def test_give_of_the_object_adds_to_the_dent():
 @pytest.mark.parametrize("slope, known", [(0.1, (0.7238, 0.7421, 0.7588)), (0.35, (0.7497, 0.7632, 0.7815))])
 def test_the_deeper_an_oblique_press_the_more_it_is_pushed_back_sideways(slope, known):
     """Sideways over normal force and slope at 2, 3 and 5 mm: the virtual laboratory's block, 105 mm wide and
-    47 high, finest element 1.3 mm. Rings that hold stiffen as the dent deepens: without that 4 to 7 % less.
+    47 high, finest element 1.3 mm, which wavers by 3 %. Rings that hold stiffen as the dent deepens: without
+    that 4 to 7 % less.
     """
     depth = np.linspace(0, 8e-3, 401)
     far = np.array([[2.52, 0.03, -0.26], [0.03, 2.52, -0.32], [-0.26, -0.32, -7.59]])
     d = np.column_stack([slope * depth, 0 * depth, -depth])
     force = touch_force(d, UP, far, law="neo-hookean", **KNOWN)[[100, 150, 250]]
-    assert -force[:, 0] / force[:, 2] / slope == pytest.approx(known, rel=0.025)
+    assert -force[:, 0] / force[:, 2] / slope == pytest.approx(known, rel=0.03)
 
 
 def test_force_is_on_the_tool_and_turns_with_the_frame():
@@ -112,6 +113,23 @@ def test_a_closed_loop_makes_no_energy():
         work = (0.5 * (force[1:] + force[:-1]) * np.diff(d, axis=0)).sum()
         stored = np.abs((force[1:] * np.diff(d, axis=0)).sum(axis=1)).sum()
         assert work < 2e-3 * stored
+
+
+@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+@pytest.mark.parametrize("far", [NONE, np.diag([30.0, 30.0, 50.0])])
+def test_a_loop_that_stretches_shallow_and_lets_go_deep_costs_as_much_as_its_way_back(law, far):
+    """What is lost is what rings hold that let go, the same both ways round; rings that stiffen as the dent
+    deepens give it back to the normal force."""
+    shallow, deep, aside = -1e-3, -5e-3, 0.7e-3
+    corners = [[0, 0, 0], [0, 0, shallow], [aside, 0, shallow], [aside, 0, deep], [0, 0, deep], [0, 0, 0]]
+    works = []
+    for loop in (corners, corners[::-1]):
+        d = path(*loop, steps=4000)
+        force = touch_force(d, UP, far, law=law, **KNOWN)
+        pieces = (0.5 * (force[1:] + force[:-1]) * np.diff(d, axis=0)).sum(axis=1)
+        works.append(pieces.sum())
+    assert works[0] < 0
+    assert works[0] == pytest.approx(works[1], abs=1e-5 * np.abs(pieces).sum())
 
 
 def test_the_sampling_of_a_path_hardly_matters():
