@@ -76,6 +76,25 @@ def test_the_base_holds_what_lies_close_above_it(block):
     assert 0.005 * below.bracing[0] > 2 * higher
 
 
+def test_a_base_comes_nearer_as_the_tip_goes_in_however_far_below_it_lies():
+    """Solved presses into a layer of 40 mm (tools.dent_edge), unit modulus: what is left does not grow with
+    depth; without what the far base braces it falls by 1.7 % from 2 to 8 mm."""
+    from palpate.mechanics.shape.tetmesh import box_mesh
+
+    depths = np.array([1, 2, 3.5, 5, 6.5, 8]) * 1e-3
+    known = 1e-6 * np.array([3.942, 11.077, 25.181, 42.455, 61.444, 81.782])
+    at = np.array([[0.003, 0.004, 0.04]])
+    sites = touch_sites(box_mesh((8, 8, 8), (0.08, 0.08, 0.04)), at, UP[None], 0.49, curvature=0.0)
+    way = np.linspace(0, 8e-3, 161)
+    law = {"young_modulus_pa": 1.0, "tip_radius_m": 0.005, "law": "neo-hookean"}
+    force = forces_at(sites, -way[:, None] * UP, np.array([0, len(way)]), **law)[:, 2]
+    left = np.interp(depths, way, force) / known - 1
+    assert np.abs(left).max() < 0.013
+    assert left[-1] - left[1] > -0.005
+    double = edge_law(box_mesh((16, 16, 8), (0.16, 0.16, 0.08)), 2 * at, UP[None])
+    assert sites.bracing[0] == pytest.approx(4 * double.bracing[0], rel=0.1)
+
+
 def test_a_base_braces_less_what_gives_way_in_volume(block):
     usual, softer, softest = (edge_law(block, *wall(0.009), nu).bracing[0] for nu in (0.49, 0.4, 0.3))
     assert usual > 1.2 * softer > 1.2 * softest > 0.3 * usual
