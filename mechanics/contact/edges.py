@@ -20,7 +20,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.patch import usual_width
-from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.mechanics.shape.nearest import distance, triangle_areas
 from palpate.mechanics.shape.tetmesh import TetMesh
 
@@ -32,46 +31,32 @@ _REACH, _STEP = 3.5, 0.5
 """Widths of a Gaussian beyond which it is left out (0.002); between its samples."""
 _ON_BASE = 0.2
 """Patch widths from the base within which a crease is the base's outline, no rim."""
-_YIELDS = 0.35
-"""Below the usual Poisson's ratio by which a base no longer braces: what lies over it gives way in volume.
-Of the usual one's bracing six solved places (flanks, a layer) ask for 0.84 at 0.45, 0.69 at 0.40, 0.47 at
-0.30."""
 _AT_ONCE = 1000
 
 
 class EdgeLaw(NamedTuple):
     """far: (k, 3, 3) 1/m, to add to the far field, unit modulus, along the normals alone. bracing: (k,) 1/m,
-    to add to the mean curvature by which a deep dent departs from Hertz (mechanics.contact.dent.bend_of): a
-    base close below makes it harder, the more the deeper. curvature: (k,) 1/m, to add to the surface's, by
-    which a rim cuts a contact off."""
+    to add to the mean curvature by which a deep dent departs from Hertz (mechanics.contact.dent.bend_of), of
+    rims; braced: (k,) 1/m, the same of the base at finite strain (DentLaw.braced), which makes a dent harder,
+    the more the deeper. curvature: (k,) 1/m, to add to the surface's, by which a rim cuts a contact off."""
 
     far: np.ndarray
     bracing: np.ndarray
+    braced: np.ndarray
     curvature: np.ndarray
 
 
-def edge_law(
-    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, poisson_ratio: float = USUAL_POISSON_RATIO
-) -> EdgeLaw:
+def edge_law(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> EdgeLaw:
     """At places (k, 3) m with unit normals (k, 3). The base counts on every mesh, rims where its shape is
     known."""
     _, over, *fits = fitted()
-    amounts = np.stack(fits)
-    amounts[1, over != RIMS] *= braced_share(poisson_ratio)
-    added, bracing, curvature = (laid(mesh, points, normals) @ amounts.T).T / usual_width(mesh)
-    return EdgeLaw(added[:, None, None] * normals[:, :, None] * normals[:, None, :], bracing, curvature)
-
-
-def braced_share(poisson_ratio: float) -> float:
-    """Of the usual Poisson's ratio's `base_bracing`, at another one."""
-    return float(np.clip(1 - (USUAL_POISSON_RATIO - poisson_ratio) / _YIELDS, 0.0, 1.0))
-
-
-def base_bracing(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(k,) 1/m, what the base adds to `EdgeLaw.bracing` of places (k, 3), at the usual Poisson's ratio."""
-    _, over, _, amount, _ = fitted()
-    near = laid(mesh, points, normals)[:, over != RIMS]
-    return near @ amount[over != RIMS] / usual_width(mesh)
+    amount, bracing, curvature = np.stack(fits)
+    near = laid(mesh, points, normals) / usual_width(mesh)
+    rims = over == RIMS
+    return EdgeLaw(
+        (near @ amount)[:, None, None] * normals[:, :, None] * normals[:, None, :],
+        near[:, rims] @ bracing[rims], near[:, ~rims] @ bracing[~rims], near @ curvature,
+    )  # fmt: skip
 
 
 def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
