@@ -109,16 +109,16 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
 
     sites = _stored("sites", model, point, normal, solve)
     far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][place], frame)
-    bent = (sites[name][place] for name in BENT_BY)
-    return Places(model, point, normal, frame, np.ascontiguousarray(far), *bent, stages)
+    bent = {name: sites[name][place] for name in BENT_BY}
+    return Places(model, point, normal, frame, np.ascontiguousarray(far), **bent, stages=stages)
 
 
 def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
     """The presses' places on a model, where they are solved as touch sites already."""
     frame = presses.frame
     far = np.ascontiguousarray(np.einsum("pij,pjk,plk->pil", frame, sites.far, frame))
-    bent = (getattr(sites, name) for name in BENT_BY)
-    return Places(model, presses.point, presses.normal, frame, far, *bent)
+    bent = {name: getattr(sites, name) for name in BENT_BY}
+    return Places(model, presses.point, presses.normal, frame, far, **bent)
 
 
 def _shared(point: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

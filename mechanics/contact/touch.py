@@ -245,9 +245,10 @@ class TouchedPlaces:
     def of(self, touches: Sequence[int]) -> TouchedPlaces:
         """Those of some touches."""
         rows = np.asarray(touches)
-        bent = np.broadcast_arrays(self.curvature, self.bracing, self.braced, self.normals[:, 0])[:3]
+        bent = np.broadcast_arrays(self.curvature, self.bracing, self.braced, self.normals[:, 0])
+        curvature, bracing, braced = (each[rows] for each in bent[:3])
         factors = None if self.factors is None else self.factors.of(rows)
-        return TouchedPlaces(self.normals[rows], self.far[rows], *(each[rows] for each in bent), factors)
+        return TouchedPlaces(self.normals[rows], self.far[rows], curvature, bracing, braced, factors)
 
 
 def touch_force(
