@@ -17,6 +17,7 @@ from palpate.mechanics.errors import ContactError, FewPressesError, OptionError
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
+from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import Result
@@ -61,6 +62,7 @@ from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors, held
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.reconstruction.steps.s7_modulus.modulus_field import with_fitted_field
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit
+from palpate.reconstruction.steps.s7_modulus.sideways import SLIDES
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,8 +72,9 @@ class Reconstruction(Result):
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
     held_out: how the model predicts places that were held out; None by the method paper, or of one place.
-    exact: touched places that were solved. `plot`: force over time with the touches that were found. `show`:
-    the model.
+    exact: touched places that were solved. fitted_presses: what the modulus was fitted to; sideways: their
+    sideways force over that of a tip that sticks (`steps.s7_modulus.sideways`). `plot`: force over time
+    with the touches that were found. `show`: the model.
     """
 
     model: Model
@@ -88,6 +91,13 @@ class Reconstruction(Result):
     placed: Placed | None = None
     held_out: HeldOutErrors | None = None
     exact: FittedSolution | None = None
+    fitted_presses: Presses | None = None
+    sideways: float = float("nan")
+
+    @property
+    def slides(self) -> bool:
+        """Whether the tip slid, so that the modulus is by the force along the normal alone."""
+        return self.sideways < SLIDES
 
     @property
     def doubt(self) -> str:
@@ -315,27 +325,30 @@ def _concluded(
         placed=body.placed,
         held_out=predicted,
         exact=fitted.solved,
+        fitted_presses=fitted.presses,
+        sideways=fitted.sideways,
     )
 
 
 def _judged(
     model: Model, fitted: ModulusOnMesh, field: str, noise_n: float, clock: Clock, progress: Progress
 ) -> tuple[Model, HeldOutErrors | None]:
-    """The model, with a field where that is wanted and its presses ask for one, and how it predicts places
-    that were held out."""
+    """The model, with a field where that is wanted, its presses ask for one, and it predicts places that were
+    held out better; and how they are predicted."""
     sites, modulus = fitted.sites, fitted.modulus
     if sites is None or modulus is None:
         return model, None
-    presses, by_others = model.presses, modulus_by_others(modulus)
+    presses, by_others = fitted.presses, modulus_by_others(modulus)
     predicted = held_out(presses, sites, modulus, by_others)
     clock.lap("held-out places")
-    if field == "auto" or (field == "where-beaten" and predicted is not None and predicted.beaten_by):
+    if field == "auto" or (field == "where-beaten" and predicted is not None and predicted.doubt):
         progress("modulus from place to place", 0.82)
-        model, of_field = with_fitted_field(model, sites, noise_n)
+        there, of_field = with_fitted_field(model, presses, sites, noise_n)
         clock.lap("modulus field")
-        if of_field is not None:
-            predicted = held_out(presses, sites, modulus, of_field)
-            clock.lap("held-out places")
+        by_field = None if of_field is None else held_out(presses, sites, modulus, of_field)
+        clock.lap("held-out places")
+        if by_field is not None and (predicted is None or by_field.model_n < predicted.model_n):
+            model, predicted = there, by_field
     return model, predicted
 
 

@@ -70,6 +70,7 @@ RECONSTRUCT = table(
     rejected=CONTACTS,
     findings=many(FINDING),
     doubt=TEXT,
+    sideways_share=MAYBE,
     held_out_rmse_n=MAYBE,
     held_out_constant_rmse_n=MAYBE,
     held_out_floor=or_null(TEXT),
