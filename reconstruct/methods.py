@@ -103,7 +103,7 @@ class ModulusOnMesh:
     """The modulus, Pa, by one of the methods, and the mesh (linear or quadratic) that it holds on.
 
     presses: what it was fitted to. sideways: their sideways force over that of a tip that sticks, NaN where
-    few are pressed obliquely (`steps.s7_modulus.sideways`).
+    few are pressed obliquely or the shape is not known (`steps.s7_modulus.sideways`).
     """
 
     mesh: TetMesh
@@ -162,7 +162,8 @@ class FiniteTip:
 
         presses = body.presses
         fit, solved = fitted(presses), None
-        sideways = sideways_share(presses, sites, fit.press.law)
+        # normals of a surface through the touches are not sure enough to tell what lies aside of them
+        sideways = float("nan") if placed is None else sideways_share(presses, sites, fit.press.law)
         if sideways < SLIDES:
             presses = along_the_normal(presses)
             fit = fitted(presses)

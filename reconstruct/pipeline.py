@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.linear_range import linear_range
 from palpate.mechanics.disk.toml_text import plain
-from palpate.mechanics.errors import ContactError, FewPressesError, OptionError
+from palpate.mechanics.errors import ContactError, FewPressesError, OptionError, PalpateWarning
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
@@ -243,17 +244,27 @@ def _placed(
     mesher: BackgroundMesher,
     progress: Progress,
 ) -> _Shaped:
-    """The known geometry where the touches place it."""
+    """The known geometry where the touches place it, without those that it shows to lie on the support."""
     progress("contacts", 0.3)
-    placed = place(
-        measured,
-        geometry,
-        mesh_size_m=options.meshing.mesh_size_m,
-        spacing_m=options.surface.surface_spacing_m,
-        progress=part(progress, 0.3, 0.8),
-    )
-    measured = on_base(measured, placed.base, options.contact.least_palpations)
-    measured = with_findings(measured, checked_presses(measured), options.force)
+
+    def put(by: Measured) -> Placed:
+        return place(
+            by,
+            geometry,
+            mesh_size_m=options.meshing.mesh_size_m,
+            spacing_m=options.surface.surface_spacing_m,
+            progress=part(progress, 0.3, 0.8),
+        )
+
+    least = options.contact.least_palpations
+    placed = put(measured)
+    over = on_base(measured, placed.base, least)
+    if len(over.presses) < len(measured.presses):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PalpateWarning)  # the file's, which were given above
+            placed = put(over)
+        over = on_base(measured, placed.base, least)
+    measured = with_findings(over, checked_presses(over), options.force)
     if placed.mesh is not None:
         mesher.known(placed.mesh)
     mesher.begin(placed.surface)

@@ -49,5 +49,18 @@ def test_a_tip_that_slides_has_none_and_tells_the_modulus_along_the_normal():
     assert fit_modulus(along_the_normal(presses), sites, NOISE).modulus_pa == pytest.approx(E, rel=0.02)
 
 
+def test_wrong_normals_are_no_slide():
+    """An ellipsoid through the touches of a box: its force lay aside of the normals, in no direction that the
+    tip went."""
+    presses, sites = pressed(SLOPE, slides=False)
+    around = np.linspace(0, 2 * np.pi, len(presses), endpoint=False)
+    lean = np.tan(np.radians(25))
+    leant = np.column_stack([lean * np.cos(around), lean * np.sin(around), np.ones(len(presses))])
+    leant /= np.linalg.norm(leant, axis=1, keepdims=True)
+    sites = dataclasses.replace(sites, normals=leant)
+    share = sideways_share(dataclasses.replace(presses, normal=leant), sites, "linear")
+    assert not share < SLIDES
+
+
 def test_straight_presses_do_not_tell_whether_the_tip_slides():
     assert np.isnan(sideways_share(*pressed(0.0, slides=True), "linear"))

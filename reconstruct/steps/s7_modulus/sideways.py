@@ -24,8 +24,11 @@ LEAST_PLACES = 4
 
 
 def sideways_share(presses: Presses, sites: TouchSites, law: str) -> float:
-    """Sideways force over that of a tip that sticks, each beside its force along the normal; median over
-    places. NaN where fewer than LEAST_PLACES are pressed obliquely. sites: one a press, in order."""
+    """Sideways force over that of a tip that sticks, rms, each beside its force along the normal; median over
+    places.
+
+    NaN where fewer than LEAST_PLACES are pressed obliquely. sites: one a press, in order.
+    """
     data = press_data(presses)
     stuck = forces_at(
         sites, data.displacement, data.starts, young_modulus_pa=1.0, tip_radius_m=data.tip_radius_m, law=law
@@ -42,7 +45,7 @@ def sideways_share(presses: Presses, sites: TouchSites, law: str) -> float:
     told, own = summed(along[0], along[0]), summed(aside[0], aside[0])
     with np.errstate(divide="ignore", invalid="ignore"):
         level = summed(along[0], along[1]) / told
-        share = summed(aside[0], aside[1]) / own / level
+        share = np.sqrt(summed(aside[1], aside[1]) / own) / level
     oblique = (own > OBLIQUE**2 * told) & (level > 0)
     places = np.unique(presses.site[oblique])
     if len(places) < LEAST_PLACES:

@@ -102,7 +102,7 @@ def _taken_as(result: Reconstruction) -> Iterator[str]:
     """What else than a tip that sticks and one modulus was taken, as the presses ask for it."""
     if result.slides:
         yield (
-            f"the tip slides: its sideways force is {percent(max(result.sideways, 0.0))} of a stuck one's, "
+            f"the tip slides: its sideways force is {percent(result.sideways)} of a stuck one's, "
             "so the modulus is by the force along the normal alone; `palpate diagnose` tells the friction"
         )
     if field := result.model.effects.get("stiffness_field"):
