@@ -292,7 +292,13 @@ def _defaults(stated: Stated) -> tuple[str, ...]:
     names = [n for n in stated.as_json() if n not in stated.given]
     if not names:
         return ()
-    return (f"not stated, so the model's own are taken: {', '.join(names)} (--stated KEY=VALUE)",)
+    notes = [f"not stated, so the model's own are taken: {', '.join(names)} (--stated KEY=VALUE)"]
+    if "friction" in names and math.isinf(stated.friction):
+        notes.append(
+            "the model names no friction, so the tip is taken to stick; what `palpate` renders, replays or "
+            "exports slides at 1 then: --stated friction=1"
+        )
+    return tuple(notes)
 
 
 def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:

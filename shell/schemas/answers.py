@@ -54,7 +54,9 @@ FINDING = table(
     channels=TEXTS,
     ways=many(table(says=TEXT, options=PLAIN)),
 )
-FORCE_ERRORS = dict.fromkeys(("force_error_n", "shape_error_n", "first_touch_error_n"), Sometimes(NUMBER))
+FORCE_ERRORS = dict.fromkeys(
+    ("force_error_n", "modulus_error_n", "shape_error_n", "first_touch_error_n"), Sometimes(NUMBER)
+)
 
 CHECK = table(
     recording=TEXT, grave=COUNT, findings=many(FINDING), seen=many(table(what=TEXT, value=MAYBE, usual=MAYBE))
