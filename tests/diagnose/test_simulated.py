@@ -76,6 +76,9 @@ def test_a_simulation_by_our_own_law_has_no_flaw(world):
     assert result.effects == () and result.kind == "none"
     assert shares(result) == pytest.approx(1.0)
     assert result.gap_before_n < 1.3 * result.noise_n
+    # a diagnosis lets the tip stick, a renderer lets it slide at 1
+    assert any("--stated friction=1" in note for note in result.notes)
+    assert not any("friction" in note for note in judged(world, world[3], friction=0.5).notes)
 
 
 def test_a_stiffer_mesh_is_numerics_and_a_stated_modulus_a_parameter(world):
