@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
 from palpate.mechanics.contact.depth_factors import DepthFactors
-from palpate.mechanics.contact.touch import TouchedPlaces
+from palpate.mechanics.contact.touch import touched
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.options import option
 from palpate.mechanics.press_solver.solved_places import (
@@ -171,12 +171,11 @@ def _solve(
     """The touched places, by the laws of the dent that a fit with tabulated ones left open."""
     laws = [law for law, (_, _, share) in fit.by_law.items() if share > 0]
     presses = body.presses
-    places = TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing)
-    touched = PlacesToSolve(sites.points, presses.site, presses.deepest, places)
-    places_to_solve = len(deepest_of_sites(touched.site, touched.deepest_m))
+    asked = PlacesToSolve(sites.points, presses.site, presses.deepest, touched(sites))
+    places_to_solve = len(deepest_of_sites(asked.site, asked.deepest_m))
     say(f"--exact: {said_beforehand(places_to_solve, len(laws))}")
     return solve_touched(
-        mesh, touched, laws, ratio=np.ones(len(mesh.tetrahedra)), poisson_ratio=body.poisson_ratio,
+        mesh, asked, laws, ratio=np.ones(len(mesh.tetrahedra)), poisson_ratio=body.poisson_ratio,
         young_modulus_pa=fit.modulus_pa, tip_radius_m=presses.tip_radius_m,
         surface=(body.surface.vertices, body.surface.triangles), progress=progress,
     )  # fmt: skip

@@ -3,8 +3,7 @@
 Bodies of unit modulus stand on their base: a tip of 5 mm presses, sticking, into the top of prisms beside a
 rim, or into their flanks above the base, into flat layers and into known shapes (mechanics.press_solver,
 neo-Hookean). The amounts of that part of mechanics.contact.edges that are not zero are fitted to the
-logarithm of the forces, through the touch law; those of the other part stay. A bracing of all places alike,
-which whole bodies show beside a half-space, is fitted beside those of the base and left out.
+logarithm of the forces, through the touch law; those of the other part stay.
 """
 
 from __future__ import annotations
@@ -28,6 +27,7 @@ from palpate.mechanics.compliance.sites import (
     touch_sites,
     touch_solver,
 )
+from palpate.mechanics.contact import edges
 from palpate.mechanics.contact.dent import ellipse_curvature
 from palpate.mechanics.contact.edges import fitted, laid
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
@@ -40,7 +40,7 @@ RADIUS_M, NU = 5e-3, 0.49
 HEIGHT_M, LENGTH_M, WIDTH_M = 0.040, 0.080, 0.080
 DEPTHS_M = 1e-3 * np.array([1.0, 2.0, 3.5, 5.0, 6.5, 8.0, 10.0, 12.0])
 ANGLES = (90.0, 120.0)
-LAYERS_M = (0.010, 0.015, 0.022, 0.030)
+LAYERS_M = (0.015, 0.022, 0.030, 0.040, 0.060, 0.100)
 FROM_RIM_M = 1e-3 * np.array([1.5, 2.5, 3.5, 5.0, 8.0])
 FROM_BASE_M = 1e-3 * np.array([6.5, 8.5, 11.0, 15.0, 21.0])
 RIMS, BASE = "rims", "base"
@@ -124,17 +124,15 @@ class Pressed:
     laid: np.ndarray
     curvature: float
 
-    def by_law(
-        self, amounts: np.ndarray, bracing: np.ndarray, curvature: np.ndarray, alike: float = 0.0
-    ) -> np.ndarray:
-        """(d,) m^2: the touch law's with these amounts (g,). alike: 1/m, bracing of all places."""
+    def by_law(self, amounts: np.ndarray, bracing: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+        """(d,) m^2: the touch law's with these amounts (g,)."""
         way = np.unique(np.concatenate([np.linspace(0.0, self.depths[-1], STEPS), self.depths]))
         along = np.outer(self.normal, self.normal)
         place = TouchedPlaces(
             self.normal[None],
             (self.far + self.laid @ amounts * along)[None],
             np.array([self.curvature + self.laid @ curvature]),
-            np.array([alike + self.laid @ bracing]),
+            np.array([self.laid @ bracing]),
         )
         force = touch_forces(
             -way[:, None] * self.normal, np.array([0, len(way)]), place,
@@ -176,23 +174,22 @@ def fit(found: list[Pressed], part: str) -> tuple[np.ndarray, float, float]:
     The Gaussian that has a curvature is of places on the rim itself, which no press here is, and stays. A few
     very deep presses are not met by any amounts: beyond _FAR_OFF they count in proportion, not by the square.
     """
-    _, over_base, *amounts = fitted()
+    _, over, *amounts = fitted()
     given = np.stack(amounts)
-    free = (given != 0) & (given[2] == 0) & (over_base == (part == BASE))
-    count = int(free.sum())
+    free = (given != 0) & (given[2] == 0) & ((over != edges.RIMS) == (part == BASE))
     known = np.isfinite(np.concatenate([one.force for one in found]))
 
     def left(numbers: np.ndarray) -> np.ndarray:
-        amounts, alike = given.copy(), float(numbers[count:].sum()) / RADIUS_M
-        amounts[free] = numbers[:count]
+        amounts = given.copy()
+        amounts[free] = numbers
         compliance, bracing, curvature = amounts
-        forces = [one.by_law(compliance, bracing, curvature, alike) / one.force for one in found]
+        forces = [one.by_law(compliance, bracing, curvature) / one.force for one in found]
         return np.log(np.concatenate(forces))[known]
 
-    start = np.zeros(count + (part == BASE))
+    start = np.zeros(int(free.sum()))
     solved = least_squares(left, start, x_scale="jac", loss="soft_l1", f_scale=_FAR_OFF)
-    given[free] = solved.x[:count]
-    before, after = (float(np.sqrt((left(x) ** 2).mean())) for x in (start, solved.x[:count]))
+    given[free] = solved.x
+    before, after = (float(np.sqrt((left(x) ** 2).mean())) for x in (start, solved.x))
     return given, before, after
 
 
@@ -214,7 +211,9 @@ def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
         depths = DEPTHS_M[SHALLOWEST] if arguments.part == BASE else DEPTHS_M
         found += pressed(meshed(prism, 0.01), *prism.places(arguments.part, arguments.seed), depths)
     for height in arguments.layers if arguments.part == BASE else ():
-        mesh = box_mesh((8, 8, max(1, round(height / 5e-3))), (LENGTH_M, WIDTH_M, height))
+        side = max(LENGTH_M, 1.4 * height)
+        across, down = round(side / 0.01), max(1, round(height / max(5e-3, 0.08 * height)))
+        mesh = box_mesh((across, across, down), (side, side, height))
         depths = DEPTHS_M[DEPTHS_M < DEEPEST_OF_LAYER * height]
         found += pressed(mesh, np.array([[0.003, 0.004, height]]), UP[None], depths)
     for name in arguments.known if arguments.part == BASE else ():
@@ -222,7 +221,7 @@ def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
         places = known_places(shape, arguments.places)
         found += pressed(meshed(shape, 0.01), *places, KNOWN_DEPTHS_M, shape)
     amounts, before, after = fit(found, arguments.part)
-    widths, over_base, *_ = fitted()
+    widths, over, *_ = fitted()
     print(
         f"compliance, bracing, curvature {np.round(amounts, 4).tolist()}; {100 * before:.1f} % of the force "
         f"without, {100 * after:.1f} % with"
@@ -235,9 +234,10 @@ def run(arguments: argparse.Namespace) -> dict[str, np.ndarray | float]:
         header = (
             f"{arguments.part} last fitted: {bodies},\ntip {RADIUS_M} m, nu {NU}, neo-Hookean, sticking "
             f"sphere; made by '{command}' ({100 * after:.1f} % of the force is left)\n"
-            "width over the patch's, 0 along rims or 1 over the base, compliance, bracing, curvature"
+            "width over the patch's, 0 along rims, 1 over the base or 2 its inverse square, compliance, "
+            "bracing, curvature"
         )
-        table = np.column_stack([widths, over_base, amounts.T])
+        table = np.column_stack([widths, over, amounts.T])
         with atomic_file(Path(arguments.output)) as temporary:
             np.savetxt(temporary, table, fmt=["%.2f", "%d", *3 * ["%.4f"]], delimiter=",", header=header)
     return {"amounts": amounts, "left_without": before, "left": after}

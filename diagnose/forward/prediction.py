@@ -140,16 +140,17 @@ class Forward:
         memory, delay or reading of the same touch costs no new integration.
         """
         t = self.touches
-        table = np.array(s.touch.law_of_dent(s.nu).table)
+        law = s.touch.law_of_dent(s.nu)
+        table, bracing = np.array(law.table), s.bracing + law.braced * self.places.braced
         usual = self.model.material.young_modulus_pa
         compliance = float(s.tool_compliance * s.modulus / usual)
-        arrays = (y, s.far, s.bracing, s.stiffness, s.dent_ratio, table)
+        arrays = (y, s.far, bracing, s.stiffness, s.dent_ratio, table)
         tip = self.tip_radius * s.touch.tip_ratio
         key = hash((tip, s.nu, compliance, s.touch.friction, *(a.tobytes() for a in arrays)))
         f = self._kept.get(key)
         if f is None:
             curvature = np.broadcast_to(np.asarray(self.places.curvature, dtype=float), (len(t),))
-            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature, s.bracing)
+            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature, bracing)
             f = np.zeros_like(y)
             modulus = usual * s.stiffness
             far, mu = np.ascontiguousarray(s.far), float(s.touch.friction)
@@ -189,7 +190,7 @@ def solved(forward: Forward, progress: Progress = silent) -> Forward:
     """The same with its touched places solved under every law that a diagnosis weighs."""
     t, places, model = forward.touches, forward.places, forward.model
     far = np.einsum("pji,pjk,pkl->pil", places.frame, places.far, places.frame)
-    known = TouchedPlaces(t.normal, far, places.curvature, places.bracing)
+    known = TouchedPlaces(t.normal, far, places.curvature, places.bracing, places.braced)
     felt = felt_surface(model)
     exact = solve_touched(
         model.mesh, PlacesToSolve(t.point, place_of(t), t.deepest, known), LAWS, ratio=model.element_ratio,

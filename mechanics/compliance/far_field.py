@@ -17,7 +17,6 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance
 from palpate.mechanics.compliance.pressed_places import UNIFORM, Places
 from palpate.mechanics.compliance.sites import PATCH_WIDTH_IN_EDGES, typical_edge
-from palpate.mechanics.contact.edges import base_bracing, braced_share
 from palpate.mechanics.elastic.elasticity import element_stiffness
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.shape.tetmesh import TetMesh
@@ -135,17 +134,6 @@ def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30,
 
     table = places.stage("poisson", lambda: places.stored("poisson", solve))
     return places.far + _interpolate(table["ratios"], table["far"], nu)
-
-
-def bracing_at_poisson(places: Places, nu: float) -> np.ndarray:
-    """(p,) 1/m, the bracing at another Poisson's ratio (mechanics.contact.edges)."""
-
-    def solve() -> np.ndarray:
-        mesh, first = places.model.mesh, places.first
-        return base_bracing(mesh, places.point[first], places.normal[first])[places.place]
-
-    gained = braced_share(nu) - braced_share(places.model.material.poisson_ratio)
-    return places.bracing + gained * places.stage("base bracing", solve)
 
 
 def load_sampler(mesh: TetMesh) -> PatchSampler:

@@ -16,9 +16,11 @@ from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 
-VERSION = 10
+VERSION = 11
 UNIFORM = "uniform solver"
 """Stage: the factorisation that the places were solved by, of the object of one modulus."""
+BENT_BY = ("curvature", "bracing", "braced")
+"""What bends the dent's law at a place, of TouchSites."""
 GRAIN_M = 0.0008
 """Presses that lie closer, with nearly one normal, share a solution."""
 
@@ -28,8 +30,8 @@ class Places:
     """p presses on a model; device frame, SI units.
 
     point, normal: (p, 3). frame: (p, 3, 3) rows normal, tangent, tangent. far: (p, 3, 3) far field in those
-    frames, unit modulus, 1/m. curvature, bracing: (p,) 1/m (TouchSites). stages: what effects asked to
-    compute, by name.
+    frames, unit modulus, 1/m. curvature, bracing, braced: (p,) 1/m (TouchSites). stages: what effects asked
+    to compute, by name.
     """
 
     model: Model
@@ -39,6 +41,7 @@ class Places:
     far: np.ndarray
     curvature: np.ndarray
     bracing: np.ndarray
+    braced: np.ndarray
     stages: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -71,7 +74,7 @@ class Places:
         """Those of some presses (p,) bool; stages are computed anew where any is left out."""
         if presses.all():
             return self
-        own = ("point", "normal", "frame", "far", "curvature", "bracing")
+        own = ("point", "normal", "frame", "far", *BENT_BY)
         return replace(self, **{name: getattr(self, name)[presses] for name in own}, stages={})
 
     def stored(self, name: str, build: Callable[[], Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
@@ -102,19 +105,20 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
             stages[UNIFORM] = solver
         patch = LoadPatch(tip_radius_m=model.tool.tip_radius_m, balls=True) if balls else LoadPatch()
         sites = touch_sites(mesh, point[first], normal[first], nu, solver=solver, patch=patch)
-        return {"far": sites.far, "curvature": sites.curvature, "bracing": sites.bracing}
+        return {name: getattr(sites, name) for name in ("far", *BENT_BY)}
 
     sites = _stored("sites", model, point, normal, solve)
     far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][place], frame)
-    bent = (sites["curvature"][place], sites["bracing"][place])
-    return Places(model, point, normal, frame, np.ascontiguousarray(far), *bent, stages)
+    bent = {name: sites[name][place] for name in BENT_BY}
+    return Places(model, point, normal, frame, np.ascontiguousarray(far), **bent, stages=stages)
 
 
 def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
     """The presses' places on a model, where they are solved as touch sites already."""
     frame = presses.frame
     far = np.ascontiguousarray(np.einsum("pij,pjk,plk->pil", frame, sites.far, frame))
-    return Places(model, presses.point, presses.normal, frame, far, sites.curvature, sites.bracing)
+    bent = {name: getattr(sites, name) for name in BENT_BY}
+    return Places(model, presses.point, presses.normal, frame, far, **bent)
 
 
 def _shared(point: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

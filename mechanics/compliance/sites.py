@@ -40,9 +40,10 @@ class TouchSites:
     far: (k, 3, 3) far-field compliance, 1/m: displacement of the patch a unit force, less that of a
     half-space.
     patch_width_m, poisson_ratio: what they hold for.
-    bracing: (k,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges) and a
-    stiff ball makes them softer than its far field has it (BallLaw); none unless given. factors: of the k, on
-    the force of the law that they were solved beside, or None.
+    bracing: (k,) 1/m, by which rims make deep dents harder (mechanics.contact.edges) and a stiff ball makes
+    them softer than its far field has it (BallLaw); none unless given. braced: (k,) 1/m, by which a base
+    below makes them harder at finite strain (EdgeLaw.braced). factors: of the k, on the force of the law that
+    they were solved beside, or None.
     """
 
     points: np.ndarray
@@ -52,6 +53,7 @@ class TouchSites:
     patch_width_m: float
     poisson_ratio: float
     bracing: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    braced: np.ndarray = field(default_factory=lambda: np.zeros(1))
     factors: DepthFactors | None = None
 
     def __len__(self) -> int:
@@ -61,7 +63,8 @@ class TouchSites:
         """Some of the sites, in order."""
         return TouchSites(
             self.points[rows], self.normals[rows], self.curvature[rows], self.far[rows], self.patch_width_m,
-            self.poisson_ratio, self.bracing[rows], None if self.factors is None else self.factors.of(rows),
+            self.poisson_ratio, self.bracing[rows], self.braced[rows],
+            None if self.factors is None else self.factors.of(rows),
         )  # fmt: skip
 
     def law_error(self, usual: float) -> np.ndarray:
@@ -70,9 +73,10 @@ class TouchSites:
         return np.full(len(self), usual) if self.factors is None else self.factors.law_error(usual)
 
     def __post_init__(self) -> None:
-        given = np.broadcast_to(np.asarray(self.bracing, dtype=float), (len(self.points),))
-        object.__setattr__(self, "bracing", given)
-        for name in ("points", "normals", "curvature", "far", "bracing"):
+        for name in ("bracing", "braced"):
+            given = np.broadcast_to(np.asarray(getattr(self, name), dtype=float), (len(self.points),))
+            object.__setattr__(self, name, given)
+        for name in ("points", "normals", "curvature", "far", "bracing", "braced"):
             array = np.array(
                 getattr(self, name), dtype=float, order="C"
             )  # a copy: the caller's stays writable
@@ -190,7 +194,7 @@ def touch_sites(
     solver = solver or touch_solver(mesh, poisson_ratio)
     width = patch.width_m or load_width(solver, patch.tip_radius_m)
     far = own_blocks(solver, points, width, lambda share: progress("touch sites", share))
-    bracing, rims = np.zeros(len(points)), np.zeros(len(points))
+    bracing, braced, rims = np.zeros((3, len(points)))
     if patch.balls:
         by_balls = ball_law(solver, points, normals, width, patch.tip_radius_m)
         far, bracing = far + by_balls.far, by_balls.bracing
@@ -199,12 +203,17 @@ def touch_sites(
     far -= half_space_compliance(normals, poisson_ratio, width)
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)
-        missed = edge_law(mesh, points, normals, poisson_ratio)
-        far, bracing, rims = far + missed.far, bracing + missed.bracing, missed.curvature
+        missed = edge_law(mesh, points, normals)
+        far, bracing, braced, rims = (
+            far + missed.far,
+            bracing + missed.bracing,
+            missed.braced,
+            missed.curvature,
+        )
     if curvature is None:
         curvature = contact_curvature(mesh, points, normals, patch.tip_radius_m)
     bent = np.asarray(curvature, dtype=float) + rims
-    return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio), bracing)
+    return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio), bracing, braced)
 
 
 def patch_compliance(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

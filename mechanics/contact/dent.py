@@ -14,7 +14,7 @@ reads them all, so a new law is a new table.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -36,6 +36,12 @@ _RATIOS = {
 """Poisson's ratios that a sticking law is tabulated for; straight lines between and beyond."""
 
 
+FINITE = "neo-hookean"
+"""The law at finite strain; the others are of linear bodies."""
+_YIELDS = 0.35
+"""Below the usual Poisson's ratio by which a base no longer braces: what lies over it gives way in volume.
+Of the usual one's bracing six solved places (flanks, a layer) ask for 0.84 at 0.45, 0.69 at 0.40, 0.47 at
+0.30."""
 STIFFEST = 0.8
 """Of a contact's own compliance, the most that what is stiff close below may take away."""
 GRIPS = 0.7
@@ -45,11 +51,16 @@ GRIPS = 0.7
 @dataclass(frozen=True)
 class DentLaw:
     """A named law: table (n, 5) of c, alpha, grip, g and the slope of grip against x, at x = 0 to DEPTH_LIMIT
-    in equal steps; its source in words."""
+    in equal steps; its source in words.
+
+    braced: share of the bend that a base below adds (TouchSites.braced). At finite strain it comes nearer as
+    the tip goes in; a linear body keeps its shape, and what gives way in volume feels it less.
+    """
 
     name: str
     table: np.ndarray
     source: str
+    braced: float = 0.0
 
     def force(
         self, depth_m: np.ndarray, young_modulus_pa: float, poisson_ratio: float, tip_radius_m: float
@@ -64,9 +75,8 @@ class DentLaw:
     def scaled(self, c: np.ndarray | float, grip: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
         """The law with c and grip multiplied by factors, one or one a row of `grid()`."""
         own = self.table
-        return DentLaw(
-            name or self.name, _table(own[:, 0] * c, own[:, 1], own[:, 2] * grip, own[:, 3]), self.source
-        )
+        table = _table(own[:, 0] * c, own[:, 1], own[:, 2] * grip, own[:, 3])
+        return replace(self, name=name or self.name, table=table)
 
 
 @lru_cache(maxsize=64)
@@ -82,8 +92,11 @@ def dent_law(
     if name in _FOLLOWED:
         bent = _beyond_hertz()
         c = c * slipping(name, poisson_ratio, friction)
+    braced = 0.0
+    if name == FINITE:
+        braced = float(np.clip(1 - (USUAL_POISSON_RATIO - poisson_ratio) / _YIELDS, 0.0, 1.0))
     # coarse elements make the first rows of a table waver; what holds never softens as the tip goes in
-    return DentLaw(name, _table(c, alpha, np.maximum.accumulate(tau / alpha), bent), source)
+    return DentLaw(name, _table(c, alpha, np.maximum.accumulate(tau / alpha), bent), source, braced)
 
 
 def _table(c: np.ndarray, alpha: np.ndarray, grip: np.ndarray, g: np.ndarray) -> np.ndarray:

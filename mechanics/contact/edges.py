@@ -5,8 +5,9 @@ presses, and is wider than a contact whose strain meets the base. Solved presses
 base say what compliance that puts in or leaves out, and how much harder a deep dent is above the base
 (tools.dent_edge). It is laid on as Gaussians summed over the length of the rims and the area of the base, so
 it is smooth from place to place, adds up where edges meet, and ends some patch widths away. What of the base
-lies straight below counts most, by the cube of the cosine: what is beside a flank holds it less. All are
-numbers of a place: the force at it stays the slope of one energy.
+lies straight below counts most, by the cube of the cosine: what is beside a flank holds it less. However far
+it lies, it comes nearer as the tip goes in: what it takes off a compliance grows as 1 / (h - depth) at height
+h, so its bracing falls as 1 / h^2. All are numbers of a place: the force at it stays the slope of one energy.
 """
 
 from __future__ import annotations
@@ -19,64 +20,51 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.patch import usual_width
-from palpate.mechanics.plausible import USUAL_POISSON_RATIO
 from palpate.mechanics.shape.nearest import distance, triangle_areas
 from palpate.mechanics.shape.tetmesh import TetMesh
 
+RIMS, BASE, INVERSE_SQUARE = 0, 1, 2
+"""What a row of dent_edge.csv is: a Gaussian along rims, one over the base, or the base from afar."""
 TURN_POWER = 3
 """Power of a rim's turn, over a right angle, with which it counts: solved for 60 and 90 degrees."""
 _REACH, _STEP = 3.5, 0.5
 """Widths of a Gaussian beyond which it is left out (0.002); between its samples."""
 _ON_BASE = 0.2
 """Patch widths from the base within which a crease is the base's outline, no rim."""
-_YIELDS = 0.35
-"""Below the usual Poisson's ratio by which a base no longer braces: what lies over it gives way in volume.
-Of the usual one's bracing six solved places (flanks, a layer) ask for 0.84 at 0.45, 0.69 at 0.40, 0.47 at
-0.30."""
 _AT_ONCE = 1000
 
 
 class EdgeLaw(NamedTuple):
     """far: (k, 3, 3) 1/m, to add to the far field, unit modulus, along the normals alone. bracing: (k,) 1/m,
-    to add to the mean curvature by which a deep dent departs from Hertz (mechanics.contact.dent.bend_of): a
-    base close below makes it harder, the more the deeper. curvature: (k,) 1/m, to add to the surface's, by
-    which a rim cuts a contact off."""
+    to add to the mean curvature by which a deep dent departs from Hertz (mechanics.contact.dent.bend_of), of
+    rims; braced: (k,) 1/m, the same of the base at finite strain (DentLaw.braced), which makes a dent harder,
+    the more the deeper. curvature: (k,) 1/m, to add to the surface's, by which a rim cuts a contact off."""
 
     far: np.ndarray
     bracing: np.ndarray
+    braced: np.ndarray
     curvature: np.ndarray
 
 
-def edge_law(
-    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, poisson_ratio: float = USUAL_POISSON_RATIO
-) -> EdgeLaw:
+def edge_law(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> EdgeLaw:
     """At places (k, 3) m with unit normals (k, 3). The base counts on every mesh, rims where its shape is
     known."""
-    _, over_base, *fits = fitted()
-    amounts = np.stack(fits)
-    amounts[1, over_base] *= braced_share(poisson_ratio)
-    added, bracing, curvature = (laid(mesh, points, normals) @ amounts.T).T / usual_width(mesh)
-    return EdgeLaw(added[:, None, None] * normals[:, :, None] * normals[:, None, :], bracing, curvature)
-
-
-def braced_share(poisson_ratio: float) -> float:
-    """Of the usual Poisson's ratio's `base_bracing`, at another one."""
-    return float(np.clip(1 - (USUAL_POISSON_RATIO - poisson_ratio) / _YIELDS, 0.0, 1.0))
-
-
-def base_bracing(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(k,) 1/m, what the base adds to `EdgeLaw.bracing` of places (k, 3), at the usual Poisson's ratio."""
-    _, over_base, _, amount, _ = fitted()
-    near = laid(mesh, points, normals)[:, over_base]
-    return near @ amount[over_base] / usual_width(mesh)
+    _, over, *fits = fitted()
+    amount, bracing, curvature = np.stack(fits)
+    near = laid(mesh, points, normals) / usual_width(mesh)
+    rims = over == RIMS
+    return EdgeLaw(
+        (near @ amount)[:, None, None] * normals[:, :, None] * normals[:, None, :],
+        near[:, rims] @ bracing[rims], near[:, ~rims] @ bracing[~rims], near @ curvature,
+    )  # fmt: skip
 
 
 def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(k,) how near places (k, 3) are to a rim, by the first Gaussian, and to the base; 0 far away, 1 on a
     straight rim of a right angle."""
-    over_base = fitted()[1]
+    over = fitted()[1]
     near = laid(mesh, points, normals)
-    return near[:, np.argmin(over_base)], near[:, np.argmax(over_base)]
+    return near[:, np.argmax(over == RIMS)], near[:, np.argmax(over == BASE)]
 
 
 def ends_within(mesh: TetMesh, points: np.ndarray, width_m: float) -> np.ndarray:
@@ -87,13 +75,16 @@ def ends_within(mesh: TetMesh, points: np.ndarray, width_m: float) -> np.ndarray
 
 
 def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(k, g) what each Gaussian comes to at places (k, 3): 1 on a straight rim that turns by a right angle,
-    and, but for the cube of the cosine, on a plane base."""
-    widths, over_base, *_ = fitted()
+    """(k, g) what each comes to at places (k, 3): a Gaussian 1 on a straight rim that turns by a right angle,
+    and, but for the cube of the cosine, on a plane base; the inverse square (s / h)^2 at a great height h
+    above a wide one."""
+    widths, over, *_ = fitted()
     sigma = widths * usual_width(mesh)
     columns = []
-    for s, of_base in zip(sigma, over_base, strict=True):
-        if of_base:
+    for s, kind in zip(sigma, over, strict=True):
+        if kind == INVERSE_SQUARE:
+            columns.append(_from_afar(points, normals, *_base(mesh, _STEP * s), s))
+        elif kind == BASE:
             middles, area = _base(mesh, _STEP * s)
             columns.append(_summed(points, middles, area / (2 * np.pi * s**2), s, normals))
         else:
@@ -104,12 +95,27 @@ def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=1)
 def fitted() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(g,) widths of Gaussians over the patch's; whether each is laid over the base, or else along the rims;
-    their amounts: compliance times the patch's width and the modulus; bracing and curvature times the patch's
-    width."""
+    """(g,) widths over the patch's; RIMS, BASE or INVERSE_SQUARE of the base; their amounts: compliance times
+    the patch's width and the modulus; bracing and curvature times the patch's width."""
     table = np.loadtxt(Path(__file__).with_name("dent_edge.csv"), delimiter=",", ndmin=2)
-    widths, over_base, amount, bracing, curvature = table.T
-    return widths, over_base > 0, amount, bracing, curvature
+    widths, over, amount, bracing, curvature = table.T
+    return widths, over, amount, bracing, curvature
+
+
+def _from_afar(
+    points: np.ndarray, normals: np.ndarray, middles: np.ndarray, area: np.ndarray, width_m: float
+) -> np.ndarray:
+    """(k,) of pieces of the base (s, 3) m, (s,) m^2, by the fourth power of their distance to points (k, 3)
+    from width_m on, and by the cube of the cosine."""
+    total = np.zeros(len(points))
+    for start in range(0, len(points), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        way = points[some, None] - middles
+        square = np.einsum("ksx,ksx->ks", way, way)
+        below = np.maximum(np.einsum("ksx,kx->ks", way, normals[some]), 0.0)
+        cosine = below / np.sqrt(np.maximum(square, 1e-300))
+        total[some] = (cosine**3 / (square + width_m**2) ** 2) @ area
+    return 5 / (2 * np.pi) * width_m**2 * total
 
 
 def _summed(

@@ -232,21 +232,23 @@ def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]
 @dataclass(frozen=True)
 class TouchedPlaces:
     """Where k touches are. normals: (k, 3) outward unit. far: (k, 3, 3) 1/m, unit modulus (TouchSites.far).
-    curvature: (k,) or one, 1/m, mean, convex positive. bracing: (k,) or one, 1/m (TouchSites.bracing).
+    curvature: (k,) or one, 1/m, mean, convex positive. bracing, braced: (k,) or one, 1/m (TouchSites).
     factors: on the forces, where the places are solved."""
 
     normals: np.ndarray
     far: np.ndarray
     curvature: np.ndarray | float = 0.0
     bracing: np.ndarray | float = 0.0
+    braced: np.ndarray | float = 0.0
     factors: DepthFactors | None = None
 
     def of(self, touches: Sequence[int]) -> TouchedPlaces:
         """Those of some touches."""
         rows = np.asarray(touches)
-        curvature, bracing = np.broadcast_arrays(self.curvature, self.bracing, self.normals[:, 0])[:2]
+        bent = np.broadcast_arrays(self.curvature, self.bracing, self.braced, self.normals[:, 0])
+        curvature, bracing, braced = (each[rows] for each in bent[:3])
         factors = None if self.factors is None else self.factors.of(rows)
-        return TouchedPlaces(self.normals[rows], self.far[rows], curvature[rows], bracing[rows], factors)
+        return TouchedPlaces(self.normals[rows], self.far[rows], curvature, bracing, braced, factors)
 
 
 def touch_force(
@@ -292,21 +294,28 @@ def touch_forces(
     displacement: (n, 3) m; touch i holds the rows starts[i] to starts[i + 1] (k + 1 entries) and begins
     untouched.
     """
-    table = (law if isinstance(law, DentLaw) else dent_law(law, poisson_ratio)).table
+    law = law if isinstance(law, DentLaw) else dent_law(law, poisson_ratio)
     displacement = np.ascontiguousarray(displacement, dtype=float)
     starts = np.ascontiguousarray(starts, dtype=np.int64)
     count = len(starts) - 1
     curvature = np.broadcast_to(np.asarray(places.curvature, dtype=float), (count,))
-    radii, bends = effective_radius(tip_radius_m, curvature), bend_of(tip_radius_m, curvature, places.bracing)
+    bracing = places.bracing + law.braced * np.asarray(places.braced)
+    radii, bends = effective_radius(tip_radius_m, curvature), bend_of(tip_radius_m, curvature, bracing)
     plane_strain, stick = moduli(young_modulus_pa, poisson_ratio)
     out = np.zeros_like(displacement)
     frames = local_frames(places.normals)
     fars = np.ascontiguousarray(np.asarray(places.far, dtype=float) / young_modulus_pa)
-    _touch_paths(displacement, starts, frames, fars, table, radii, bends, plane_strain, stick, out)
+    _touch_paths(displacement, starts, frames, fars, law.table, radii, bends, plane_strain, stick, out)
     if places.factors is not None:
         touch = np.repeat(np.arange(count), np.diff(starts))
         out *= places.factors.at(touch, -np.einsum("nc,nc->n", displacement, places.normals[touch]))[:, None]
     return out
+
+
+def touched(sites: TouchSites) -> TouchedPlaces:
+    """One touch at each of the k sites."""
+    bent = (sites.curvature, sites.bracing, sites.braced)
+    return TouchedPlaces(sites.normals, sites.far, *bent, sites.factors)
 
 
 def forces_at(
@@ -322,7 +331,7 @@ def forces_at(
     return touch_forces(
         displacement,
         starts,
-        TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing, sites.factors),
+        touched(sites),
         young_modulus_pa=young_modulus_pa,
         poisson_ratio=sites.poisson_ratio,
         tip_radius_m=tip_radius_m,

@@ -151,7 +151,7 @@ def solved_change(ball: Ball, places: Places) -> tuple[np.ndarray, np.ndarray]:
     sites = touch_sites(mesh, point, normal, nu, solver=solver, curvature=0.0, patch=patch)
     far, bracing = sites.far, sites.bracing
     if uniform:  # a width that is given leaves edges out
-        missed = edge_law(mesh, point, normal, nu)
+        missed = edge_law(mesh, point, normal)
         far, bracing = far + missed.far, bracing + missed.bracing
     along = np.einsum("qi,qij,qj->q", normal, far, normal)
     return along - places.far[places.first, 0, 0], bracing - places.bracing[places.first]

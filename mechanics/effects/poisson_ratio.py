@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from palpate.mechanics.compliance.far_field import bracing_at_poisson, far_at_poisson
+from palpate.mechanics.compliance.far_field import far_at_poisson
 from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene
@@ -14,7 +14,6 @@ from palpate.mechanics.plausible import POISSON_RATIO
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     settings.nu = float(values[0])
     settings.far = settings.far - scene.places.far + far_at_poisson(scene.places, settings.nu)
-    settings.bracing = settings.bracing - scene.places.bracing + bracing_at_poisson(scene.places, settings.nu)
 
 
 EFFECT = Effect(

@@ -10,6 +10,7 @@ from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import contact_curvature
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
+from palpate.mechanics.contact.dent import DentLaw
 from palpate.mechanics.contact.edges import edge_law
 from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.errors import MeshError
@@ -26,16 +27,16 @@ class FineSurface:
     of contact_curvature, convex positive, and what a rim close by adds (mechanics.contact.edges); only
     where far is known.
 
-    bracing: (v,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges) and balls
-    bend the dent's law (mechanics.compliance.near_field).
+    bracing: (v,) 1/m, by which rims, the base (mechanics.contact.edges) and balls
+    (mechanics.compliance.near_field) bend the dent's law.
     softness: (v,) of the material under a tip, global modulus over its own. parents: (k, 3) numbers of each
-    fine triangle's mesh corners among the compliance's, -1 on the base.
+    fine triangle's mesh corners among the compliance's, -1 on the base. law: of the dent.
 
     What is local is the dent's, which goes with the modulus under the tip: where that is not the global one,
     the half-space that the compliance takes off is of the wrong modulus, and the difference is given back.
     """
 
-    def __init__(self, model: Model, surface: ContactSurface, compliance: Compliance) -> None:
+    def __init__(self, model: Model, surface: ContactSurface, compliance: Compliance, law: DentLaw) -> None:
         arrays, mesh, nu = surface.arrays, model.mesh, model.material.poisson_ratio
         number = np.full(int(max(surface.parents.max(), compliance.nodes.max())) + 1, -1, dtype=np.int64)
         number[compliance.nodes] = np.arange(len(compliance.nodes))
@@ -47,9 +48,10 @@ class FineSurface:
         self.far, self._added = np.zeros((v, 3, 3)), np.zeros((v, 3, 3))
         self.curvature, self.bracing, self.softness = np.zeros(v), np.zeros(v), np.ones(v)
         self._rims = np.zeros(v)
-        missed = edge_law(mesh, points, normals, nu)
-        self._added[touched], self.bracing[touched] = missed.far, missed.bracing
-        self._over_base = np.array(self.bracing)
+        missed = edge_law(mesh, points, normals)
+        self._added[touched] = missed.far
+        self.bracing[touched] = missed.bracing + law.braced * missed.braced
+        self._without_balls = np.array(self.bracing)
         self._rims[touched] = missed.curvature
         self.softness[touched] = surface_softness(mesh, model.surface_ratio, points, tip)
         width = float(compliance.own_width_m[0])
@@ -81,7 +83,7 @@ class FineSurface:
 
     def field_of(self, compliance: Compliance) -> tuple[np.ndarray, np.ndarray]:
         """(far (v, 3, 3), bracing (v,)), 1/m, by another compliance of the same object."""
-        far, bracing, at = np.zeros_like(self.far), np.array(self._over_base), self._touched
+        far, bracing, at = np.zeros_like(self.far), np.array(self._without_balls), self._touched
         far[at] = compliance.far_at(self._vertices[at], self._normals[at]) + self._added[at]
         bracing[at] += compliance.bracing_at(self._vertices[at])
         return far, bracing

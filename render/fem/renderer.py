@@ -52,7 +52,8 @@ class FemRenderer(Renderer):
         self.contact = touched_surface(model, self.options)  # seconds before minutes
         self.compliance = compliance or load_or_condense(model, progress=progress)
         touch = rendered_touch(model, self.options)
-        self._fine = field = FineSurface(model, self.contact, self.compliance)
+        law = touch.law_of_dent(model.material.poisson_ratio)
+        self._fine = field = FineSurface(model, self.contact, self.compliance, law)
         number = np.full(len(model.mesh.points), len(self.compliance.nodes))
         number[self.compliance.nodes] = np.arange(len(self.compliance.nodes))
         self._drawn = number[self.contact.nodes]
@@ -67,7 +68,7 @@ class FemRenderer(Renderer):
             parent_weights=self.contact.parent_weights,
             blocks=np.array(self.compliance.blocks),
             factor=np.array(self.compliance.factor),
-            table=np.array(touch.law_of_dent(model.material.poisson_ratio).table),
+            table=np.array(law.table),
             young_modulus_pa=np.array([model.material.young_modulus_pa]),
             poisson_ratio=np.array([model.material.poisson_ratio]),
             friction=np.array([touch.friction]),

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from palpate.mechanics.compliance.sites import principal_curvatures
-from palpate.mechanics.contact.dent import ellipse_curvature
+from palpate.mechanics.contact.dent import dent_law, ellipse_curvature
 from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.shape.nearest import neighbours, sample
@@ -209,7 +209,7 @@ def test_curvatures_are_the_shapes_and_not_the_meshs():
     assert abs(direction[1] @ [np.sqrt(0.5), 0, -np.sqrt(0.5)]) == pytest.approx(1, abs=1e-2)
     made = shapes.model(meshed(shape, (6, 5)).quadratic())
     felt = contact_surface(made.mesh)
-    field = FineSurface(made, felt, shapes.quick_compliance(made))
+    field = FineSurface(made, felt, shapes.quick_compliance(made), dent_law("neo-hookean"))
     touched = np.unique(felt.arrays.triangles[felt.arrays.free > 0])
     bent = principal_curvatures(made.mesh, felt.arrays.vertices[touched], felt.arrays.normals[touched])
     felt_bend = ellipse_curvature(bent, made.tool.tip_radius_m)

@@ -183,7 +183,7 @@ def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> 
     # a dent of `under` times the modulus in a far field of 1 is that of one modulus in a stiffer far field
     scale = under[:, None, None]
     far = scale * solved[places.place] + (scale - 1) * half[places.place]
-    far += scale * edge_law(mesh, sites.points, sites.normals, sites.poisson_ratio).far
+    far += scale * edge_law(mesh, sites.points, sites.normals).far
     return FieldSites(replace(sites, far=far, patch_width_m=width), under)
 
 
