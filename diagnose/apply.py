@@ -11,8 +11,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from palpate.diagnosis.search.attribution import Attribution
+from palpate.diagnosis.search.fit import covariance
 from palpate.mechanics.effects.base import Role
 from palpate.mechanics.effects.registry import effect, effects
+from palpate.mechanics.law_errors import Level
+from palpate.mechanics.model.material import UNKNOWN
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import Recording
 
@@ -43,13 +46,17 @@ def improved(model: Model, diagnosis: Verdict, without: Sequence[str] = ()) -> t
     """(model with the asserted effects, their names). Instrument effects are left out: they must not be
     rendered; so are those of `without`.
 
-    The modulus, and the dent law that is rendered, are those of the diagnosis's own fit; see
-    `with_replayed_modulus`.
+    The modulus with its interval, and the dent law that is rendered, are those of the diagnosis's own fit;
+    see `with_replayed_modulus`.
     """
+    modulus, interval = diagnosis.young_modulus_pa, UNKNOWN
     parameters = {e.name: dict(e.parameters) for e in diagnosis.entries}
     asserted = {name: parameters.get(name, {}) for name in diagnosis.effects if name not in without}
     provenance = {**model.provenance, "diagnosed_effects": list(asserted)}
     if diagnosis.attribution is not None:
+        final = diagnosis.attribution.final
+        sd = np.hypot(np.sqrt(covariance(final.found, final.dof)[0, 0]), Level.modulus.value)
+        interval = float(modulus * np.exp(-1.96 * sd)), float(modulus * np.exp(1.96 * sd))
         # known physics that the fit did without is left out of the model as well
         fitted = diagnosis.attribution.final.found.names
         held = {*fitted, *diagnosis.effects, *model.effects}
@@ -57,7 +64,8 @@ def improved(model: Model, diagnosis: Verdict, without: Sequence[str] = ()) -> t
         for each in effects():
             if each.role is Role.KNOWN and each.name in held and each.apply is not None:
                 model = each.apply(model, {})
-    better = with_effects(model.with_modulus(diagnosis.young_modulus_pa), asserted)
+    levelled = model.with_material(young_modulus_pa=modulus, young_modulus_ci95_pa=interval)
+    better = with_effects(levelled, asserted)
     better = better.replaced(provenance=provenance)
     return better, [name for name in asserted if effect(name).rendered]
 
@@ -67,7 +75,8 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
 
     A fit moves first touches and sites' stiffnesses beside the modulus, which a renderer cannot; what they
     leave to the modulus is made good here, by the median over presses: one drag that the model misses must
-    not decide. recording: read right (`corrected`). Where the replay gives no force the model stays.
+    not decide. Its interval goes with it. recording: read right (`corrected`). Where the replay gives no
+    force the model stays.
     """
     from palpate.render.registry import create
     from palpate.render.replay import replay_recording
@@ -87,7 +96,8 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
             return model
         modulus *= float(np.median(meets[felt] / power[felt]))
         renderer = renderer.with_modulus(modulus)
-    return model.with_modulus(modulus)
+    low, high = np.array(model.material.young_modulus_ci95_pa) * modulus / model.material.young_modulus_pa
+    return model.with_material(young_modulus_pa=modulus, young_modulus_ci95_pa=(float(low), float(high)))
 
 
 @dataclass(frozen=True)

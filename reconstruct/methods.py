@@ -36,6 +36,7 @@ from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, ModulusO
 from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from palpate.reconstruction.steps.s7_modulus.shape_error import compliance_covariance
+from palpate.reconstruction.steps.s7_modulus.sideways import SLIDES, along_the_normal, sideways_share
 
 METHODS = ("finite-tip", "paper")
 Say = Callable[[str], None]
@@ -99,9 +100,14 @@ class FittedSolution:
 
 @dataclass(frozen=True)
 class ModulusOnMesh:
-    """The modulus, Pa, by one of the methods, and the mesh (linear or quadratic) that it holds on."""
+    """The modulus, Pa, by one of the methods, and the mesh (linear or quadratic) that it holds on.
+
+    presses: what it was fitted to. sideways: their sideways force over that of a tip that sticks, NaN where
+    few are pressed obliquely or the shape is not known (`steps.s7_modulus.sideways`).
+    """
 
     mesh: TetMesh
+    presses: Presses
     modulus_pa: float
     ci95_pa: tuple[float, float]
     press_modulus_pa: np.ndarray
@@ -109,6 +115,7 @@ class ModulusOnMesh:
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
     solved: FittedSolution | None = None
+    sideways: float = float("nan")
 
     @property
     def misfit_n(self) -> np.ndarray | None:
@@ -147,30 +154,44 @@ class FiniteTip:
         )
         clock.lap("shape error")
 
-        def fitted(exact: Mapping[str, DepthFactors] | None = None) -> ModulusFit:
+        def fitted(presses: Presses, exact: Mapping[str, DepthFactors] | None = None) -> ModulusFit:
             return fit_modulus(
-                body.presses, sites, body.noise_n, self.options.modulus,
+                presses, sites, body.noise_n, self.options.modulus,
                 compliance_covariance=covariance, exact=exact, seed=self.options.seed,
             )  # fmt: skip
 
-        fit, solved = fitted(), None
+        presses = body.presses
+        fit, solved = fitted(presses), None
+        # normals of a surface through the touches are not sure enough to tell what lies aside of them
+        sideways = float("nan") if placed is None else sideways_share(presses, sites, fit.press.law)
+        if sideways < SLIDES:
+            presses = along_the_normal(presses)
+            fit = fitted(presses)
         if self.options.modulus.exact:
             clock.lap("modulus")
-            solved = FittedSolution(_solve(body, mesh, sites, fit, part(progress, 0.6, 0.8), say), fit)
+            solved = FittedSolution(
+                _solve(body, presses, mesh, sites, fit, part(progress, 0.6, 0.8), say), fit
+            )
             clock.lap("solved places")
-            fit = fitted(solved.presses.factors)
+            fit = fitted(presses, solved.presses.factors)
             sites = dataclasses.replace(sites, factors=solved.presses.factors[fit.press.law])
         return ModulusOnMesh(
-            mesh, fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa, sites, fit, solved=solved
-        )
+            mesh, presses, fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa, sites, fit, solved=solved,
+            sideways=sideways,
+        )  # fmt: skip
 
 
 def _solve(
-    body: BodyToFit, mesh: TetMesh, sites: TouchSites, fit: ModulusFit, progress: Progress, say: Say
+    body: BodyToFit,
+    presses: Presses,
+    mesh: TetMesh,
+    sites: TouchSites,
+    fit: ModulusFit,
+    progress: Progress,
+    say: Say,
 ) -> ExactPresses:
     """The touched places, by the laws of the dent that a fit with tabulated ones left open."""
     laws = [law for law, (_, _, share) in fit.by_law.items() if share > 0]
-    presses = body.presses
     asked = PlacesToSolve(sites.points, presses.site, presses.deepest, touched(sites))
     places_to_solve = len(deepest_of_sites(asked.site, asked.deepest_m))
     say(f"--exact: {said_beforehand(places_to_solve, len(laws))}")
@@ -202,7 +223,9 @@ class Paper:
         fit = fit_paper_modulus(
             body.curves, body.mesh, body.poisson_ratio, self.options.paper, seed=self.options.seed
         )
-        return ModulusOnMesh(body.mesh, fit.modulus_pa, fit.ci95_pa, fit.press_modulus_pa, paper_fit=fit)
+        return ModulusOnMesh(
+            body.mesh, body.presses, fit.modulus_pa, fit.ci95_pa, fit.press_modulus_pa, paper_fit=fit
+        )
 
 
 Method = FiniteTip | Paper

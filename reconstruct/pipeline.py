@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -13,10 +14,11 @@ import numpy as np
 from palpate.mechanics.compliance.sites import TouchSites
 from palpate.mechanics.contact.linear_range import linear_range
 from palpate.mechanics.disk.toml_text import plain
-from palpate.mechanics.errors import ContactError, FewPressesError, OptionError
+from palpate.mechanics.errors import ContactError, FewPressesError, OptionError, PalpateWarning
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
+from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import Result
@@ -61,6 +63,7 @@ from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors, held
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
 from palpate.reconstruction.steps.s7_modulus.modulus_field import with_fitted_field
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit
+from palpate.reconstruction.steps.s7_modulus.sideways import SLIDES
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,8 +73,9 @@ class Reconstruction(Result):
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
     held_out: how the model predicts places that were held out; None by the method paper, or of one place.
-    exact: touched places that were solved. `plot`: force over time with the touches that were found. `show`:
-    the model.
+    exact: touched places that were solved. fitted_presses: what the modulus was fitted to; sideways: their
+    sideways force over that of a tip that sticks (`steps.s7_modulus.sideways`). `plot`: force over time
+    with the touches that were found. `show`: the model.
     """
 
     model: Model
@@ -88,6 +92,13 @@ class Reconstruction(Result):
     placed: Placed | None = None
     held_out: HeldOutErrors | None = None
     exact: FittedSolution | None = None
+    fitted_presses: Presses | None = None
+    sideways: float = float("nan")
+
+    @property
+    def slides(self) -> bool:
+        """Whether the tip slid, so that the modulus is by the force along the normal alone."""
+        return self.sideways < SLIDES
 
     @property
     def doubt(self) -> str:
@@ -233,17 +244,27 @@ def _placed(
     mesher: BackgroundMesher,
     progress: Progress,
 ) -> _Shaped:
-    """The known geometry where the touches place it."""
+    """The known geometry where the touches place it, without those that it shows to lie on the support."""
     progress("contacts", 0.3)
-    placed = place(
-        measured,
-        geometry,
-        mesh_size_m=options.meshing.mesh_size_m,
-        spacing_m=options.surface.surface_spacing_m,
-        progress=part(progress, 0.3, 0.8),
-    )
-    measured = on_base(measured, placed.base, options.contact.least_palpations)
-    measured = with_findings(measured, checked_presses(measured), options.force)
+
+    def put(by: Measured) -> Placed:
+        return place(
+            by,
+            geometry,
+            mesh_size_m=options.meshing.mesh_size_m,
+            spacing_m=options.surface.surface_spacing_m,
+            progress=part(progress, 0.3, 0.8),
+        )
+
+    least = options.contact.least_palpations
+    placed = put(measured)
+    over = on_base(measured, placed.base, least)
+    if len(over.presses) < len(measured.presses):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PalpateWarning)  # the file's, which were given above
+            placed = put(over)
+        over = on_base(measured, placed.base, least)
+    measured = with_findings(over, checked_presses(over), options.force)
     if placed.mesh is not None:
         mesher.known(placed.mesh)
     mesher.begin(placed.surface)
@@ -315,27 +336,30 @@ def _concluded(
         placed=body.placed,
         held_out=predicted,
         exact=fitted.solved,
+        fitted_presses=fitted.presses,
+        sideways=fitted.sideways,
     )
 
 
 def _judged(
     model: Model, fitted: ModulusOnMesh, field: str, noise_n: float, clock: Clock, progress: Progress
 ) -> tuple[Model, HeldOutErrors | None]:
-    """The model, with a field where that is wanted and its presses ask for one, and how it predicts places
-    that were held out."""
+    """The model, with a field where that is wanted, its presses ask for one, and it predicts places that were
+    held out better; and how they are predicted."""
     sites, modulus = fitted.sites, fitted.modulus
     if sites is None or modulus is None:
         return model, None
-    presses, by_others = model.presses, modulus_by_others(modulus)
+    presses, by_others = fitted.presses, modulus_by_others(modulus)
     predicted = held_out(presses, sites, modulus, by_others)
     clock.lap("held-out places")
-    if field == "auto" or (field == "where-beaten" and predicted is not None and predicted.beaten_by):
+    if field == "auto" or (field == "where-beaten" and predicted is not None and predicted.doubt):
         progress("modulus from place to place", 0.82)
-        model, of_field = with_fitted_field(model, sites, noise_n)
+        there, of_field = with_fitted_field(model, presses, sites, noise_n)
         clock.lap("modulus field")
-        if of_field is not None:
-            predicted = held_out(presses, sites, modulus, of_field)
-            clock.lap("held-out places")
+        by_field = None if of_field is None else held_out(presses, sites, modulus, of_field)
+        clock.lap("held-out places")
+        if by_field is not None and (predicted is None or by_field.model_n < predicted.model_n):
+            model, predicted = there, by_field
     return model, predicted
 
 

@@ -45,10 +45,11 @@ _STEEPNESS = 1.4
 
 @dataclass(frozen=True)
 class ForceErrors:
-    """95 % half widths, N, a sample each (n,): of the law (mesh and tables), of the shape's uncertainty, of
-    the first touches that it was drawn through."""
+    """95 % half widths, N, a sample each (n,): of the law (mesh and tables), of the modulus, of the shape's
+    uncertainty, of the first touches that it was drawn through."""
 
     law_n: np.ndarray
+    modulus_n: np.ndarray
     shape_n: np.ndarray
     first_touch_n: np.ndarray
 
@@ -74,15 +75,26 @@ def force_errors(
     sd = uncertain[near] if len(uncertain) == len(surface.vertices) else np.zeros(len(size))
     measured = len(renderer.model.presses) and not is_given(renderer.model)
     onset = ONSET_NOISE_M if measured else 0.0
-    return ForceErrors(shares * size, SURE * sd * steepness, SURE * onset * steepness)
+    return ForceErrors(
+        shares * size,
+        modulus_share(renderer.model) * size,
+        SURE * sd * steepness,
+        SURE * onset * steepness,
+    )
+
+
+def modulus_share(model: Model) -> float:
+    """Half width of the modulus's 95 % interval over it; 0 of one that is stated and not measured."""
+    low, high = model.material.young_modulus_ci95_pa
+    return 0.5 * (high - low) / model.material.young_modulus_pa if np.isfinite([low, high]).all() else 0.0
 
 
 def error_figures(errors: ForceErrors | None) -> dict[str, float]:
     """Keys of `--json`: rms over the samples; nothing where nothing is known."""
     if errors is None:
         return {}
-    parts = {"force_error_n": errors.law_n, "shape_error_n": errors.shape_n}
-    parts["first_touch_error_n"] = errors.first_touch_n
+    parts = {"force_error_n": errors.law_n, "modulus_error_n": errors.modulus_n}
+    parts |= {"shape_error_n": errors.shape_n, "first_touch_error_n": errors.first_touch_n}
     return {key: float(np.sqrt(np.mean(np.square(part)))) for key, part in parts.items()}
 
 
@@ -90,8 +102,12 @@ def said(figures: dict[str, float]) -> str:
     """The figures in words; '' for none."""
     if not figures:
         return ""
-    law, shape, touch = (f"{1e3 * value:.3g}" for value in figures.values())
-    return f"may be off (95 %) by {law} mN for the law, {shape} for the shape, {touch} for its first touches"
+    law, modulus, *others = figures.values()
+    shape, touch = (f"{1e3 * value:.3g}" for value in others)
+    return (
+        f"may be off (95 %) by {1e3 * float(np.hypot(law, modulus)):.3g} mN for the law"
+        f"{' and the modulus' if modulus else ''}, {shape} for the shape, {touch} for its first touches"
+    )
 
 
 def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOptions) -> tuple[float, float]:

@@ -57,6 +57,8 @@ def emit_json(value: Any, destination: str | None) -> None:
 
 
 _REDRAWN_S, _SHORT_S = 1.0, 5.0
+SILENT_S = 10.0
+"""How long nothing is said where no terminal shows a bar."""
 
 
 def progress_bar(label: str) -> Bar:
@@ -65,8 +67,8 @@ def progress_bar(label: str) -> Bar:
 
 
 class Bar(AbstractContextManager["Bar"]):
-    """The one display of every wait: on a terminal a bar with the stage and what is left of it, which goes on
-    while a stage tells of nothing; elsewhere nothing, so that standard error holds errors alone."""
+    """The one display of every wait, which goes on while a stage tells of nothing: on a terminal a bar with
+    the stage and what is left of it; elsewhere a line of these, of what takes longer than SILENT_S."""
 
     def __init__(self, label: str) -> None:
         from tqdm import tqdm
@@ -86,8 +88,7 @@ class Bar(AbstractContextManager["Bar"]):
         self._left, self._closed = Remaining(), threading.Event()
         self._left.tell(0.0)
         self._thread = threading.Thread(target=self._go_on, name="progress", daemon=True)
-        if terminal:
-            self._thread.start()
+        self._thread.start()
 
     def __call__(self, stage: str, fraction: float) -> None:
         self._stage, self._share = stage, min(max(fraction, 0.0), 1.0)
@@ -109,14 +110,16 @@ class Bar(AbstractContextManager["Bar"]):
         self._bar.refresh()
 
     def _go_on(self) -> None:
-        while not self._closed.wait(_REDRAWN_S):
-            self._draw()
+        while not self._closed.wait(_REDRAWN_S if self._terminal else SILENT_S):
+            if self._terminal:
+                self._draw()
+            else:
+                print(f"{self._words()} ...", file=sys.stderr, flush=True)
 
     def close(self) -> None:
         """Finish the bar's line."""
         self._closed.set()
-        if self._terminal:
-            self._thread.join()
+        self._thread.join()
         self._bar.close()
 
     def __exit__(self, *_: object) -> None:

@@ -42,6 +42,8 @@ from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.presses_on_model import presses_on
 
 OWN_MODULUS = "stated_modulus"
+LIKELIER = 0.5
+"""Probability that what is named has more of."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,6 +123,17 @@ class _Weighed:
     least_n: float
     own: Own | None
 
+    @property
+    def open_names(self) -> tuple[str, ...]:
+        """Effects of the object that are as likely not there: they are candidates, as in a diagnosis."""
+        likely = {e.name: e.probability for e in self.reality.entries}
+        return tuple(name for name in self.real.names if likely[name] <= LIKELIER)
+
+    @property
+    def real_names(self) -> tuple[str, ...]:
+        """Effects of the object that are named."""
+        return tuple(name for name in self.real.names if name not in self.open_names)
+
     def square(self, name: str) -> float:
         """N^2, the mean square of a gap."""
         return self.weighing.gap_n(self.gaps[name]) ** 2
@@ -173,7 +186,7 @@ def _concluded(w: _Weighed) -> SimulatedGap:
     parts = {
         "numerics": part_of("simulated", "numerics", numerics.named),
         "parameters": part_of("numerics", "parameters", [p.name for p in w.wrong]),
-        "reality": part_of("touches", "reality", w.real.names),
+        "reality": part_of("touches", "reality", w.real_names),
     }
     explained = sum(p.share for p in parts.values())
     after, counts = _after(w), weighing.counts
@@ -182,7 +195,8 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         np.random.default_rng(w.seed), w.resamples,
     )  # fmt: skip
     names = _by_size(w)
-    candidates = [*numerics.candidates, *_unstated(w.asked.stated, numerics), *reality.candidates]
+    unstated = _unstated(w.asked.stated, numerics)
+    candidates = [*numerics.candidates, *unstated, *w.open_names, *reality.candidates]
     coarse = w.sides.coarse
     reasons = [*numerics.reasons, *(f"of our own model: {r}" for r in reality.reasons)]
     if coarse:
@@ -217,8 +231,8 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         entries=_entries(w, names),
         young_modulus_pa=reality.young_modulus_pa,
         advice=advice_of(
-            numerics, w.wrong, w.real.names, w.asked.advice,
-            unstated=bool(_unstated(w.asked.stated, numerics)), poisson_limit=w.asked.poisson_limit,
+            numerics, w.wrong, w.real_names, w.asked.advice,
+            unstated=bool(unstated), poisson_limit=w.asked.poisson_limit,
         ),
         notes=(*w.sides.notes, *_defaults(w.asked.stated)),
         reasons=tuple(answer.reasons),
@@ -248,7 +262,7 @@ def _by_size(w: _Weighed) -> list[str]:
     wrong = [p.name for p in w.wrong]
     sizes = sizes_alone(w.sides.forward, w.numerics, wrong, w.measured, w.weighing)
     real = w.weighing.rms_n(w.gaps["touches"] - w.gaps["reality"])
-    sizes |= {name: real for name in w.real.names}
+    sizes |= {name: real for name in w.real_names}
     return sorted(sizes, key=lambda name: -sizes[name])
 
 
@@ -269,7 +283,13 @@ def _defaults(stated: Stated) -> tuple[str, ...]:
     names = [n for n in stated.as_json() if n not in stated.given]
     if not names:
         return ()
-    return (f"not stated, so the model's own are taken: {', '.join(names)} (--stated KEY=VALUE)",)
+    notes = [f"not stated, so the model's own are taken: {', '.join(names)} (--stated KEY=VALUE)"]
+    if "friction" in names and math.isinf(stated.friction):
+        notes.append(
+            "the model names no friction, so the tip is taken to stick; what `palpate` renders, replays or "
+            "exports slides at 1 then: --stated friction=1"
+        )
+    return tuple(notes)
 
 
 def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:

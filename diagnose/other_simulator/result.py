@@ -43,14 +43,15 @@ def advice_of(
     """own_words: by numerical effect, in that simulator's words. real: effects that only a model with them
     has. unstated: a stiffness may be a modulus that nobody stated."""
     said = []
-    for name in (*numerics.named, *numerics.candidates):
-        words = numerical(name).advised(numerics.keys[name], own_words.get(name, ""))
-        which = "" if name in numerics.named else "or "
-        said.append(f"{which}{name.replace('_', ' ')}: {words}")
     if unstated:
         said.append(
-            "or stated modulus: what the simulator was given is not stated; give --stated young_modulus_pa=PA"
+            "stated modulus: what the simulator was given is not stated, and forces do not part it from the "
+            "mesh's stiffness; give --stated young_modulus_pa=PA"
         )
+    for name in (*numerics.named, *numerics.candidates):
+        words = numerical(name).advised(numerics.keys[name], own_words.get(name, ""))
+        which = "" if name in numerics.named and not (unstated and name == "mesh_stiffness") else "or "
+        said.append(f"{which}{name.replace('_', ' ')}: {words}")
     said += [f"{p.name.replace('_', ' ')}: {parameter_words(p, poisson_limit)}" for p in wrong]
     for name in real:
         said.append(
@@ -185,6 +186,12 @@ class SimulatedGap(Result):
     own: OwnFlaws | None = None
     made_up: tuple[MadeUp, ...] = ()
     coarse: str = ""
+
+    @property
+    def body_alone(self) -> bool:
+        """Whether the whole body is too stiff or too soft, and forces alone do not tell by its modulus, which
+        nobody stated, or by its mesh."""
+        return "mesh_stiffness" in self.effects and "stated_modulus" in self.candidates
 
     @property
     def without_numerics_n(self) -> float:

@@ -2,13 +2,13 @@
 
 Every law is a table over x = delta / R of four numbers, with E* = E / (1 - nu^2), G = E / (2 (1 + nu)):
     normal force        E* R^2 c(x) (1 + k R g(x)) x^1.5    (k: mean curvature of the surface)
-    contact radius      a = R alpha(x) x^0.5
-    sideways stiffness  8 G / (2 - nu) a grip(x)    (stick; Mindlin's 8 G a / (2 - nu) where grip = 1; the
-    strain of a deep dent makes every ring of the contact stiffer by it)
-Hertz is c = 4/3, alpha = grip = 1, g = 0. A tip that slips is pushed back less, the deeper the more: c falls
-with Coulomb's friction (`slipping`). On a curved surface R is the effective radius, which is Hertz's
-answer for a small contact; g is what a deep one on a bump or in a hollow has beyond it. One numba kernel
-reads them all, so a new law is a new table.
+    sideways stiffness  8 G / (2 - nu) a grip(x), a = R held(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) of
+    a contact of radius a where grip = 1)
+Hertz is c = 4/3, held = grip = 1, g = 0. grip never falls: the strain of a deep dent makes every ring of the
+contact stiffer. What makes the stick softer with depth, as a stiff skin does, makes outer rings narrower. A
+tip that slips is pushed back less, the deeper the more: c falls with Coulomb's friction (`slipping`). On a
+curved surface R is the effective radius, which is Hertz's answer for a small contact; g is what a deep one on
+a bump or in a hollow has beyond it. One numba kernel reads them all, so a new law is a new table.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ GRIPS = 0.7
 
 @dataclass(frozen=True)
 class DentLaw:
-    """A named law: table (n, 5) of c, alpha, grip, g and the slope of grip against x, at x = 0 to DEPTH_LIMIT
+    """A named law: table (n, 5) of c, held, grip, g and the slope of grip against x, at x = 0 to DEPTH_LIMIT
     in equal steps; its source in words.
 
     braced: share of the bend that a base below adds (TouchSites.braced). At finite strain it comes nearer as
@@ -72,10 +72,11 @@ class DentLaw:
         _dent_forces(self.table, depth, float(tip_radius_m), float(plane_strain), force)
         return force
 
-    def scaled(self, c: np.ndarray | float, grip: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
-        """The law with c and grip multiplied by factors, one or one a row of `grid()`."""
+    def scaled(self, c: np.ndarray | float, tau: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
+        """The law with its normal force and sideways stiffness multiplied by factors, one or one a row of
+        `grid()`."""
         own = self.table
-        table = _table(own[:, 0] * c, own[:, 1], own[:, 2] * grip, own[:, 3])
+        table = _table(own[:, 0] * c, own[:, 1], own[:, 1] * own[:, 2] * tau, own[:, 3])
         return replace(self, name=name or self.name, table=table)
 
 
@@ -95,13 +96,16 @@ def dent_law(
     braced = 0.0
     if name == FINITE:
         braced = float(np.clip(1 - (USUAL_POISSON_RATIO - poisson_ratio) / _YIELDS, 0.0, 1.0))
-    # coarse elements make the first rows of a table waver; what holds never softens as the tip goes in
-    return DentLaw(name, _table(c, alpha, np.maximum.accumulate(tau / alpha), bent), source, braced)
+    return DentLaw(name, _table(c, alpha, tau, bent), source, braced)
 
 
-def _table(c: np.ndarray, alpha: np.ndarray, grip: np.ndarray, g: np.ndarray) -> np.ndarray:
-    """(n, 5) of a law, read only."""
-    table = np.column_stack([c, alpha, grip, g, np.gradient(grip, DEPTH_LIMIT / _STEPS)])
+def _table(c: np.ndarray, alpha: np.ndarray, tau: np.ndarray, g: np.ndarray) -> np.ndarray:
+    """(n, 5) of a law, read only. alpha: (n,) contact radius over R x^0.5; tau: (n,) sideways stiffness, of
+    Mindlin's under a contact of that radius R x^0.5."""
+    grip = np.maximum.accumulate(tau / alpha)
+    root = np.sqrt(grid())
+    held = np.append(tau[0] / grip[0], np.maximum.accumulate(tau * root / grip)[1:] / root[1:])
+    table = np.column_stack([c, held, grip, g, np.gradient(grip, DEPTH_LIMIT / _STEPS)])
     table.setflags(write=False)
     return table
 
@@ -204,8 +208,8 @@ _LAWS: dict[str, Callable[[float], tuple[np.ndarray, str]]] = {
 
 @kernel
 def dent_force(table, depth, radius, bend, plane_strain_modulus):
-    """(force N, stiffness N/m, contact radius m, grip, its slope 1/m) at an indentation, m; zeros where it is
-    not positive. radius: effective, m. bend: mean curvature of the surface times the tip's radius."""
+    """(force N, stiffness N/m, radius that holds m, grip, its slope 1/m) at an indentation, m; zeros where it
+    is not positive. radius: effective, m. bend: mean curvature of the surface times the tip's radius."""
     if not depth > 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0
     x = depth / radius
@@ -215,7 +219,7 @@ def dent_force(table, depth, radius, bend, plane_strain_modulus):
     i = int(position)
     slope = 0.0
     if i >= last:
-        c, alpha, grip = table[last, 0] * (1.0 + bend * table[last, 3]), table[last, 1], table[last, 2]
+        c, held, grip = table[last, 0] * (1.0 + bend * table[last, 3]), table[last, 1], table[last, 2]
         stiffens = 0.0
     else:
         f = position - i
@@ -223,13 +227,13 @@ def dent_force(table, depth, radius, bend, plane_strain_modulus):
         high = table[i + 1, 0] * (1.0 + bend * table[i + 1, 3])
         slope = (high - low) / step
         c = low + f * (high - low)
-        alpha = table[i, 1] + f * (table[i + 1, 1] - table[i, 1])
+        held = table[i, 1] + f * (table[i + 1, 1] - table[i, 1])
         grip = table[i, 2] + f * (table[i + 1, 2] - table[i, 2])
         stiffens = table[i, 4] + f * (table[i + 1, 4] - table[i, 4])
     root = np.sqrt(x)
     force = plane_strain_modulus * radius * radius * c * x * root
     stiffness = plane_strain_modulus * radius * (1.5 * c * root + slope * x * root)
-    return force, stiffness, radius * alpha * root, grip, stiffens / radius
+    return force, stiffness, radius * held * root, grip, stiffens / radius
 
 
 @kernel

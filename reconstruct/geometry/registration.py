@@ -30,6 +30,11 @@ _ALIKE_M = 0.02
 """Of the size: poses whose surfaces lie nearer than this are one."""
 
 
+_PAYS = 7.0
+"""Nats by which touches must be likelier under a turn before it is made: odds of a thousand to one. A round
+cap slides about its own middle and meets them in any pose."""
+_ALL, _ABOUT_UP, _NO_TURN = np.arange(6), np.array([0, 1, 2, 5]), np.arange(3)
+"""Numbers of a pose, shift then turn, that move: all; upright, about the device's z; none of the turn."""
 _BEYOND = 3.0
 """First touches so many standard deviations of their own error and the surface's lie on another one."""
 
@@ -135,7 +140,7 @@ def register(body: ShapeToPlace, touched: TouchedPoints, *, free: bool = True) -
         return solver.result(at, fit, np.zeros((6, 6)))
     found = sorted((solver.descend(start, _SHORT) for start in solver.starts()), key=lambda each: each[0])
     best = sorted((solver.descend(pose, _LONG) for _, pose in found[:_KEPT]), key=lambda each: each[0])
-    pose = best[0][1]
+    pose = solver.least_turned(best[0])
     fit = solver.evaluate(pose)
     others = [solver.evaluate(p) for _, p in best[1:] if solver.apart(pose, p)]
     rival = min((other.rms for other in others), default=np.inf)
@@ -201,11 +206,24 @@ class _Solver:
         rows = np.vstack([n * weight, 0.05 * np.eye(3)])
         return np.linalg.lstsq(rows, np.concatenate([known * weight[:, 0], 0.05 * middle]), rcond=None)[0]
 
-    def descend(self, pose: _Pose, rounds: int) -> tuple[float, _Pose]:
-        """Damped Gauss-Newton; the cost and pose at its end."""
+    def least_turned(self, best: tuple[float, _Pose]) -> _Pose:
+        """The pose that the shape's file has, else an upright one, where it is no less likely than the best
+        by more than chance; a traced support tells what is upright."""
+        cost, pose = best
+        if self.touched.support is not None:
+            return pose
+        as_filed = self.descend(_Pose(np.eye(3), self._shift(np.eye(3))), _LONG, _NO_TURN)
+        turns = _upright(self.body.up, np.array([0.0, 0.0, 1.0]), 24)
+        upright = [self.descend(_Pose(turn, self._shift(turn)), _SHORT, _ABOUT_UP) for turn in turns]
+        upright = [self.descend(min(upright, key=lambda each: each[0])[1], _LONG, _ABOUT_UP)]
+        return next((each for c, each in (as_filed, *upright) if c < cost + _PAYS), pose)
+
+    def descend(self, pose: _Pose, rounds: int, free: np.ndarray = _ALL) -> tuple[float, _Pose]:
+        """Damped Gauss-Newton in the numbers `free` of the pose; the cost and pose at its end."""
         fit, damping = self.evaluate(pose), 1e-3
         for _ in range(rounds):
-            step = -np.linalg.solve(fit.normal + damping * np.diag(np.diag(fit.normal)), fit.gradient)
+            normal, step = fit.normal[np.ix_(free, free)], np.zeros(6)
+            step[free] = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), fit.gradient[free])
             trial = self.moved(pose, step)
             new = self.evaluate(trial)
             if new.cost > fit.cost:

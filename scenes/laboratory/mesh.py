@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from palpate.mechanics.disk.scratch import cache_folder
 from palpate.mechanics.disk.writing import atomic_file, temporary_folder
@@ -126,7 +127,29 @@ def surface_key(phantom: Phantom) -> str:
     digest = hashlib.sha256()
     digest.update(np.round(phantom.vertices * 1e6).astype(np.int64).tobytes())
     digest.update(phantom.faces.tobytes())
+    if len(round_rim(phantom)):
+        digest.update(f"its foot's rim drawn to {RIM_MM} mm".encode())
     return digest.hexdigest()[:20]
+
+
+RIM_MM = 3.0
+"""Edge length at the rim of a foot that a round underside ends in: no crease of the coarse mesh draws it, and
+what its corners miss is not held."""
+_GENTLE = 0.5
+
+
+def round_rim(phantom: Phantom) -> np.ndarray:
+    """(k, 3) mm: the rim of the foot, where the surface goes on beyond it at less than 60 degrees; else
+    none."""
+    corners = phantom.vertices[phantom.faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    down = -across[:, 2] / np.maximum(np.linalg.norm(across, axis=1), 1e-300)
+    foot = (corners[:, :, 2] < 1e-9).all(axis=1)
+    rim = np.intersect1d(phantom.faces[foot], phantom.faces[~foot])
+    beyond = np.isin(phantom.faces, rim).any(axis=1) & ~foot
+    if not beyond.any() or np.median(down[beyond]) < _GENTLE:
+        return np.zeros((0, 3))
+    return phantom.vertices[rim] * 1e3
 
 
 def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -315,6 +338,8 @@ def graded_mesh(
     """
     points, tetrahedra = coarse_mesh(phantom, cache)
     surface = Surface(phantom.vertices * 1e3, phantom.faces)
+    rim = round_rim(phantom)
+    near_rim = cKDTree(rim) if len(rim) else None
 
     def size(at: np.ndarray) -> np.ndarray:
         distance = np.linalg.norm(at - point, axis=1)
@@ -322,6 +347,8 @@ def graded_mesh(
         for centre, radius in balls:
             outside = np.maximum(np.linalg.norm(at - centre, axis=1) - radius, 0.0)
             wanted = np.minimum(wanted, 0.6 * radius + 0.6 * outside)
+        if near_rim is not None:
+            wanted = np.minimum(wanted, RIM_MM + growth * near_rim.query(at)[0])
         return wanted * 1.35
 
     def project(middles: np.ndarray, half: np.ndarray) -> np.ndarray:

@@ -89,7 +89,8 @@ def _typed(unclear: Any) -> Any:
 
 
 def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
-    """Before any work: no output is an input or another output, and each can be written (check_target)."""
+    """Before any work: no output is an input or another output, and each can be written (check_target); of a
+    folder that gives way it is said."""
     read: dict[str, str] = {}
     written: dict[str, str] = {}
     targets: list[tuple[Path, Kind | FolderKind]] = []
@@ -114,8 +115,10 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
         raise OptionError(
             f"{written[same]} would replace what {read[same]} names and is read from: name another output"
         )
-    for target in targets:
-        check_target(*target)
+    for path, target in targets:
+        check_target(path, target)
+        if isinstance(target, FolderKind) and path.is_dir() and any(path.iterdir()):
+            print(f"{parser.prog}: {path} is there, and what it holds is replaced", file=sys.stderr)
 
 
 def _files_of(path: Path) -> list[Path]:

@@ -27,6 +27,7 @@ def read_recording(
     from palpate.mechanics.recording.recording import Recording as Plain
     from palpate.mechanics.recording.recording import read_recording as read
     from palpate.scenes.embedded import embedded_names, embedded_recording
+    from palpate.scenes.scene import scene_names
 
     held = source if isinstance(source, Plain) else getattr(source, "recording", None)
     if isinstance(held, Plain):
@@ -58,6 +59,9 @@ def read_recording(
             raise RecordingError(f"{error}; so it is read by '{words}'") from error
         if Path(source).exists() or "." in Path(source).name:
             raise
+        if str(source) in scene_names():
+            record = f"palpate touch {source} --headless --record {source}.csv.gz"
+            raise RecordingError(f"{error}; '{source}' is a scene: '{record}' makes one of it") from error
         raise RecordingError(f"{error}; embedded are {', '.join(embedded_names())}") from error
 
 

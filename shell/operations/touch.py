@@ -75,7 +75,8 @@ class ServoRun:
     def lines(self) -> list[str]:
         """For a person."""
         recorded = [] if self.record is None else [f"recorded {self.record}"]
-        report = self.report.text(sent=spec_of(self.device).has_force)
+        device = spec_of(self.device)
+        report = self.report.text(to=device.title if device.has_force else "")
         table = [f"at the end: {self.table_words}; what is solved is kept"] if self.table_words else []
         made_of = [f"  {words}" for words in self.object_words]
         return [f"{self.scene.title}: {self.renderer}, {self.device}", *made_of, report, *table, *recorded]

@@ -54,7 +54,9 @@ FINDING = table(
     channels=TEXTS,
     ways=many(table(says=TEXT, options=PLAIN)),
 )
-FORCE_ERRORS = dict.fromkeys(("force_error_n", "shape_error_n", "first_touch_error_n"), Sometimes(NUMBER))
+FORCE_ERRORS = dict.fromkeys(
+    ("force_error_n", "modulus_error_n", "shape_error_n", "first_touch_error_n"), Sometimes(NUMBER)
+)
 
 CHECK = table(
     recording=TEXT, grave=COUNT, findings=many(FINDING), seen=many(table(what=TEXT, value=MAYBE, usual=MAYBE))
@@ -70,6 +72,7 @@ RECONSTRUCT = table(
     rejected=CONTACTS,
     findings=many(FINDING),
     doubt=TEXT,
+    sideways_share=MAYBE,
     held_out_rmse_n=MAYBE,
     held_out_constant_rmse_n=MAYBE,
     held_out_floor=or_null(TEXT),

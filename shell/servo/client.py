@@ -70,7 +70,7 @@ class Servo(AbstractContextManager["Servo"]):
         self._block = SharedBlock() if started is None else started.block
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.Queue[dict[str, Any]] = queue.Queue()
-        self._words: list[str] = []
+        self._words: dict[str, str] = {}
         self._error = ""
         self._listener: threading.Thread | None = None
         self._tip_radius_m: float | None = None
@@ -117,7 +117,7 @@ class Servo(AbstractContextManager["Servo"]):
     @property
     def words(self) -> tuple[str, ...]:
         """What the system did not permit, what protects less than by default, what acts on the forces."""
-        return tuple(self._words)
+        return tuple(self._words.values())
 
     @property
     def failure(self) -> str:
@@ -274,7 +274,8 @@ class Servo(AbstractContextManager["Servo"]):
         for line in self._process.stdout:
             message = json.loads(line)
             if "word" in message:
-                self._words.append(message["word"])
+                # of what is told anew with every table the last word counts
+                self._words[message.get("about", f"{len(self._words)}")] = message["word"]
             elif "error" in message:
                 self._error = message["error"]
                 self._answers.put(message)

@@ -106,7 +106,8 @@ class ServoProcess:
             self._tell(
                 {
                     "word": f"virtual coupling: {1 / compliance:.0f} N/m in series (stiffest place "
-                    f"{stiffest:.0f} N/m, device limit {limit:.0f} N/m)"
+                    f"{stiffest:.0f} N/m, device limit {limit:.0f} N/m)",
+                    "about": "virtual coupling",
                 }
             )
         return renderer.with_series_compliance(compliance)

@@ -70,15 +70,15 @@ class ServoReport:
             return ""
         return f" (safety held the rest back: {', '.join(word for _, word in acted[:-3:-1])})"
 
-    def text(self, *, sent: bool = True) -> str:
-        """In lines. sent: whether there was a device to send a force to."""
+    def text(self, *, to: str = "the device") -> str:
+        """In lines. to: what a force was sent to, '' for what takes none."""
         c, late = self.compute.as_json(), self.lateness.as_json()
         lines = [
             f"{self.rate_hz:.0f} forces a second for {self.seconds:.1f} s: "
             f"{self.missed_ticks} skipped, {self.late_ticks} late",
             f"in contact {100 * self.contact_share:.0f} % of the time; greatest force "
             f"{self.peak_rendered_n:.2f} N rendered"
-            + (f", {self.peak_force_n:.2f} N sent{self._held_back()}" if sent else "")
+            + (f", {self.peak_force_n:.2f} N sent to {to}{self._held_back()}" if to else ", none sent")
             + f"; energy given to the hand at most {1000 * self.energy_given_back_j:.3f} mJ",
             f"one force is computed in {c['median']:.0f} µs (median), {c['max']:.0f} µs at most",
             f"it begins {late['median']:.0f} µs after its time (median), {late['max']:.0f} µs at most",

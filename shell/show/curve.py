@@ -69,7 +69,10 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
 
 def _solved(exact: SolvedPlace) -> say.Story:
     """Law, solution and bound along the depth."""
-    yield say.Detail("solved here, along the normal; the forces above are by it")
+    yield say.Detail(
+        f"solved here, along the normal; the forces above are by it: {exact.solved_n[-1]:.3g} N at the "
+        f"deepest, where the law's table alone says {exact.law_n[-1]:.3g} N"
+    )
     rows = zip(1e3 * exact.depth_m, exact.law_n, exact.solved_n, exact.error_n, strict=True)
     yield solved_rows("depth [mm]", rows)
 

@@ -144,10 +144,23 @@ _MOST = {
 }
 
 
+BODY = "the body's stiffness"
+
+
+def told_effects(result: SimulatedGap) -> list[str]:
+    """What is named; what forces alone do not part is one thing."""
+    return [BODY if result.body_alone and n == "mesh_stiffness" else n for n in result.effects]
+
+
+def told_rivals(result: SimulatedGap) -> list[str]:
+    """What is not ruled out beside it."""
+    return [n for n in result.candidates if not (result.body_alone and n == "stated_modulus")]
+
+
 def verdict(result: SimulatedGap) -> str:
     """The answer in one sentence."""
     if result.coarse:
-        told = spoken(result.effects) or "nothing"
+        told = spoken(told_effects(result)) or "nothing"
         return f"no verdict yet: {result.coarse}; until then do not mend what is named: {told}"
     first = max(PARTS, key=lambda name: result.parts[name].share)
     if settled := _settled(result):
@@ -156,10 +169,23 @@ def verdict(result: SimulatedGap) -> str:
         return "nothing stands out: neither numerics nor parameters nor what an ideal simulation lacks"
     elif result.unexplained > result.parts[first].share:
         most = "most of the gap is not explained"
+    elif result.body_alone and first == "numerics":
+        most = f"above all {_of_body(result)}"
     else:
         most = _MOST[first]
-    rivals = f" (not ruled out: {spoken(result.candidates, 'or')})" if result.candidates else ""
-    return f"{most}; named: {spoken(result.effects) or 'nothing'}{rivals}"
+    rivals = f" (not ruled out: {spoken(told_rivals(result), 'or')})" if told_rivals(result) else ""
+    return f"{most}; named: {spoken(told_effects(result)) or 'nothing'}{rivals}"
+
+
+def _of_body(result: SimulatedGap) -> str:
+    """A stiffness of the whole body, the simplest cause first."""
+    keys = next(e.parameters for e in result.entries if e.name == "mesh_stiffness")
+    softer = keys["ratio"] < 1 and "contact_stiffness" not in result.candidates
+    ruled_out = "; a softer contact is ruled out" if softer else ""
+    return (
+        f"the body is {keys['ratio']:.2g} times as stiff: its modulus, which nobody stated, or the "
+        f"mesh's stiffness{ruled_out}"
+    )
 
 
 def story(result: SimulatedGap) -> say.Story:
@@ -302,7 +328,12 @@ def mended_words(result: SimulatedGap) -> str:
 def _named(result: SimulatedGap, names: Sequence[str], words: Callable[[str], str] = meaning) -> list[str]:
     """Effects in words, each with its numbers."""
     numbers = {e.name: keys_in_words(e) for e in result.entries}
-    return [words(name) + (f" ({numbers[name]})" if numbers.get(name) else "") for name in names]
+    return [
+        _of_body(result)
+        if result.body_alone and name == "mesh_stiffness"
+        else words(name) + (f" ({numbers[name]})" if numbers.get(name) else "")
+        for name in names
+    ]
 
 
 def _given(result: SimulatedGap) -> list[tuple[str, str, str, str]]:
@@ -331,7 +362,7 @@ def lead(result: SimulatedGap) -> str:
     if left > most:
         return f"{off}, and {percent(left)} of that is not explained. A smaller part is: {said[0]}."
     return f"{off}. Above all: {'; then: '.join(said)}." + (
-        f" Not ruled out: {spoken(result.candidates, 'or')}." if result.candidates else ""
+        f" Not ruled out: {spoken(told_rivals(result), 'or')}." if told_rivals(result) else ""
     )
 
 

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import palpate.mechanics.compliance.fine_corners as made
-from palpate.diagnosis.apply import improvement, with_effects, with_replayed_modulus
+from palpate.diagnosis.apply import improved, improvement, with_effects, with_replayed_modulus
+from palpate.diagnosis.options import DiagnoseOptions
+from palpate.diagnosis.pipeline import diagnose
 from palpate.mechanics.compliance.near_field import BallLaw, ball_law, surface_softness
 from palpate.mechanics.compliance.pressed_places import solve_places
 from palpate.mechanics.compliance.sites import surface_edge, touch_solver
@@ -254,6 +256,16 @@ class Named:
         self.effects, self.attribution = tuple(found), None
         self.entries = tuple(SimpleNamespace(name=name, parameters=keys) for name, keys in found.items())
         self.young_modulus_pa = model.material.young_modulus_pa
+
+
+def test_the_improved_modulus_has_an_interval_that_holds_the_truth(bench):
+    recording, given = bench.record()
+    better = improved(given, diagnose(recording, given, DiagnoseOptions(fast=True, bootstrap=20)))[0]
+    for each in (better, with_replayed_modulus(better, recording)):
+        low, high = each.material.young_modulus_ci95_pa
+        assert low < each.material.young_modulus_pa < high
+    low, high = better.material.young_modulus_ci95_pa
+    assert low < 20e3 < high < 1.5 * low
 
 
 @pytest.mark.parametrize(("gap_n", "kept"), [(0.03, True), (0.28, False)])

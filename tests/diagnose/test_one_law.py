@@ -127,7 +127,8 @@ def predicted_and_rendered(names, model, places, compliance, seed=0):
     renderer = renderer._with(
         surface=flat, curvature=np.zeros(vertices), softness=np.tile(softness, vertices)
     )
-    far, bracing = np.tile(frame.T @ settings.far[0] @ frame, (vertices, 1, 1)), settings.bracing[0]
+    far = np.tile(frame.T @ settings.far[0] @ frame, (vertices, 1, 1))
+    bracing = settings.bracing[0] + settings.touch.law_of_dent(settings.nu).braced * places.braced[0]
     renderer = renderer.with_field(far, bracing=np.full(vertices, bracing))
     centre = POINT + model.tool.tip_radius_m * UP
     tips = centre - forward.touches.travel @ frame

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from palpate.diagnosis.other_simulator.forces import (
     spread_out,
 )
 from palpate.diagnosis.other_simulator.gap_decomposition import PARAMETER_OF, StatedParameter
-from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
+from palpate.diagnosis.other_simulator.pipeline import Asked, _Weighed, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import EffectEntry
@@ -75,6 +76,9 @@ def test_a_simulation_by_our_own_law_has_no_flaw(world):
     assert result.effects == () and result.kind == "none"
     assert shares(result) == pytest.approx(1.0)
     assert result.gap_before_n < 1.3 * result.noise_n
+    # a diagnosis lets the tip stick, a renderer lets it slide at 1
+    assert any("--stated friction=1" in note for note in result.notes)
+    assert not any("friction" in note for note in judged(world, world[3], friction=0.5).notes)
 
 
 def test_a_stiffer_mesh_is_numerics_and_a_stated_modulus_a_parameter(world):
@@ -88,6 +92,35 @@ def test_a_stiffer_mesh_is_numerics_and_a_stated_modulus_a_parameter(world):
     assert given.gap_after_n < 0.3 * given.gap_before_n
     for result in (mesh, given):
         assert shares(result) == pytest.approx(1.0)
+
+
+def test_a_modulus_that_nobody_stated_and_a_mesh_are_said_as_one_thing(world):
+    """A mesh was named, and the modulus only not ruled out: forces alone do not part them."""
+    result = judged(world, 1.5 * world[3])
+    assert result.body_alone
+    assert verdict(result).startswith("above all the body is 1.5 times as stiff: its modulus")
+    assert "mesh stiffness" not in verdict(result) and "stated modulus" not in verdict(result)
+    assert result.advice[0].startswith("stated modulus")
+    softer = [
+        dataclasses.replace(e, parameters={**e.parameters, "ratio": 0.7}) if e.name == "mesh_stiffness" else e
+        for e in result.entries
+    ]
+    assert "a softer contact is ruled out" in lead(dataclasses.replace(result, entries=tuple(softer)))
+    known = judged(world, 1.5 * world[3], modulus=world[1].material.young_modulus_pa)
+    assert not known.body_alone and "mesh stiffness" in verdict(known)
+
+
+def test_what_a_diagnosis_leaves_open_is_not_named_of_a_simulator(world):
+    """The terminal named an effect whose odds on the page were 39 %."""
+    recording, model, reality, _, _ = world
+    slips = dataclasses.replace(reality.entries[0], name="friction_slip", probability=0.39)
+    reality = dataclasses.replace(
+        reality, effects=("friction_slip",), entries=(slips,), kind="ambiguous", candidates=("backlash",)
+    )
+    weighed = SimpleNamespace(reality=reality, real=SimpleNamespace(names=("friction_slip",)))
+    assert _Weighed.open_names.fget(weighed) == ("friction_slip",)
+    weighed.open_names = ("friction_slip",)
+    assert _Weighed.real_names.fget(weighed) == ()
 
 
 @pytest.mark.slow
@@ -262,7 +295,7 @@ def test_numerical_effects_have_names_of_their_own_and_do_nothing_at_their_ideal
 )
 def test_the_advice_says_how_much_and_which_way(world, factor, said, unsaid):
     """Forces of 0.7 times the measured ones were told to refine the mesh, if it was too stiff."""
-    (advice,) = (words for words in judged(world, factor * world[3]).advice if words.startswith("mesh stiff"))
+    (advice,) = (words for words in judged(world, factor * world[3]).advice if "mesh stiffness:" in words)
     assert said in advice and unsaid not in advice
 
 

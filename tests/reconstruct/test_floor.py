@@ -67,6 +67,20 @@ def test_a_field_is_fitted_where_one_modulus_is_beaten(varied):
 
 
 @pytest.mark.slow
+def test_the_answer_says_that_the_modulus_differs_from_place_to_place(varied):
+    assert "the modulus differs from place to place" in "\n".join(varied.lines())
+
+
+@pytest.mark.slow
+def test_a_field_that_predicts_no_better_is_not_kept(varied, factorised_once, monkeypatch):
+    """By the field the places that were held out would be missed as a modulus ten times too high does."""
+    wrong = 10 * modulus_by_others(varied.modulus)
+    monkeypatch.setattr("palpate.reconstruction.pipeline.with_fitted_field", lambda *_: (varied.model, wrong))
+    made = reconstruct_fully(firmer_along_x(3.0), WHERE_BEATEN)
+    assert made.model.material.field is None and made.held_out.beaten_by
+
+
+@pytest.mark.slow
 def test_an_even_ground_stays_of_one_modulus(factorised_once):
     made = reconstruct_fully(points((6, 5), rows=8), WHERE_BEATEN)
     assert made.held_out.beaten_by == "" and made.held_out.floor in RIVALS

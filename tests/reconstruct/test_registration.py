@@ -85,6 +85,26 @@ def test_what_the_touches_leave_open_is_told():
     assert sd[0] < 2e-4 and sd[1] > 0.01
 
 
+def test_a_round_cap_is_not_turned_where_no_touch_asks_for_it():
+    """It leant by 20 degrees: a ball's cap turned about the ball's middle meets the touches all the same."""
+    radius_m, height_m = 0.045, 0.025
+    angle = np.linspace(0, np.arccos(1 - height_m / radius_m), 30)
+    profile = np.c_[radius_m * np.sin(angle), radius_m * np.cos(angle) - (radius_m - height_m)][::-1]
+    cap = trimesh.creation.revolve(np.vstack([[0, 0], profile[:-1], [0, height_m]]), sections=96)
+    cap.merge_vertices()
+    rng = np.random.default_rng(0)
+    polar, around = np.arcsin(0.62 * np.sqrt((np.arange(30) + 0.5) / 30)), 2.4 * np.arange(30)
+    out = np.c_[np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)]
+    shift = np.array([0.4, -0.05, 0.1])
+    middle = shift + [0, 0, height_m - radius_m]
+    centres = middle + (radius_m + TIP_M + 2e-5 * rng.standard_normal((30, 1))) * out
+    told = TouchedPoints(centres, out, np.full(30, 2e-5), np.arange(30), TIP_M)
+    shape = np.array(cap.vertices), np.array(cap.faces)
+    found = register(ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0])), told)
+    assert found.rotation[2, 2] > np.cos(np.radians(1))
+    assert found.shift_m == pytest.approx(shift, abs=2e-4)
+
+
 def test_as_it_stands_only_the_residuals_are_told():
     shape = wedge()
     told, turn, shift = touched(shape, seed=4, slips=0)

@@ -57,12 +57,20 @@ def test_what_was_done_before_does_not_count():
     assert left.words() == "about 2 min left"
 
 
-def test_without_a_terminal_nothing_is_said(capfd, monkeypatch):
+def test_a_short_wait_without_a_terminal_says_nothing(capfd, monkeypatch):
     monkeypatch.setattr(output, "_SHORT_S", 0.0)
     with progress_bar("compare") as tell:
         tell("fold 1 of 8", 0.5)
         time.sleep(0.3)
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_long_wait_without_a_terminal_says_a_line_now_and_then(capfd, monkeypatch):
+    """A press of a new object was silent for 50 s where its lines were piped."""
+    monkeypatch.setattr(output, "SILENT_S", 0.05)
+    with progress_bar("press") as tell:
+        tell("compliance", 0.5)
+        eventually(lambda: "press: compliance ..." in capfd.readouterr().err)
 
 
 def test_a_terminal_shows_stage_share_and_what_is_left(monkeypatch):

@@ -207,13 +207,14 @@ def modulus_by_field(own: PressModuli, found: FieldEstimate) -> np.ndarray:
     return np.exp(log_modulus)
 
 
-def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> tuple[Model, np.ndarray | None]:
-    """The model with the field that its presses, which touch at `sites`, ask for by its dent law, and what
+def with_fitted_field(
+    model: Model, presses: Presses, sites: TouchSites, noise_n: float
+) -> tuple[Model, np.ndarray | None]:
+    """The model with the field that presses, which touch at `sites`, ask for by its dent law, and what
     `modulus_by_field` says of them; itself and None where they ask for none. noise_n: N, of a raw component.
 
     The modulus becomes that of the field's own level, with its 95 % interval.
     """
-    presses = model.presses
     places = places_at(model, presses, sites)
     own = press_moduli(presses, sites, places, model.material.dent_law, noise_n)
     found = fit_field(own, np.arange(len(presses)))

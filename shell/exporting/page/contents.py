@@ -26,7 +26,7 @@ from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Progress, silent
 from palpate.render.base import Renderer
 from palpate.render.fem.renderer import FemRenderer
-from palpate.render.force_error import place_numbers, rendered_share
+from palpate.render.force_error import modulus_share, place_numbers, rendered_share
 from palpate.render.registry import create
 
 ONE_D = "hunt-crossley"
@@ -38,8 +38,6 @@ CURVE_POINTS = 48
 _NO_SLIP = 1e9
 _SIDEWAYS = 0.5
 """How far a press goes aside for each metre of depth when errors of sideways stiffness are weighed."""
-UNKNOWN_SHARE = 0.1
-"""Of the modulus, where a model states no interval."""
 
 
 def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[PackedArrays, dict[str, Any]]:
@@ -212,11 +210,6 @@ def force_band(renderer: FemRenderer, depth_m: np.ndarray) -> np.ndarray:
 
     The model's interval of its modulus and the law's own error (render.force_error), taken as independent.
     """
-    model = renderer.model
-    low, high = model.material.young_modulus_ci95_pa
-    modulus = UNKNOWN_SHARE
-    if np.isfinite([low, high]).all():
-        modulus = 0.5 * (high - low) / model.material.young_modulus_pa
-    radius = model.tool.tip_radius_m
+    radius = renderer.model.tool.tip_radius_m
     numbers = place_numbers(renderer, radius)[:, :, None]
-    return np.hypot(modulus, rendered_share(renderer, depth_m / radius, numbers))
+    return np.hypot(modulus_share(renderer.model), rendered_share(renderer, depth_m / radius, numbers))

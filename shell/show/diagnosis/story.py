@@ -97,7 +97,12 @@ def _how_far(result: Diagnosis) -> say.Story:
     off = f"how far: a typical touch is {force_words(result.gap_before_n)} off"
     noise = f"; the sensor's noise is {force_words(result.noise_n)}"
     if result.gap_closed is not None and result.gap_closed_ci95 is not None and result.effects:
-        yield say.TextLine(f"{off}, {force_words(result.gap_after_n)} with what was found{noise}")
+        after = force_words(result.gap_after_n)
+        if not missing(result):  # the model as it is has it
+            off = f"how far: a typical touch is {after} off; without what the model has it would be"
+            yield say.TextLine(f"{off} {force_words(result.gap_before_n)}{noise}")
+        else:
+            yield say.TextLine(f"{off}, {after} with what was found{noise}")
         share, between = estimate_words(result.gap_closed, *result.gap_closed_ci95)
         yield say.Detail(
             f"{share} of the gap above the noise is explained (95 % sure: {between}), at held-out places",

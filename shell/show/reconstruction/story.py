@@ -3,7 +3,7 @@ from a recording, beside its numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +41,7 @@ from palpate.show.reconstruction.tables import (
 )
 from palpate.show.scenery import Colours, draw_object, draw_touched
 from palpate.show.view3d import Colouring, Line, View
-from palpate.words import counted, gathered, kpa, mm, mn, place_mm, sure_kpa
+from palpate.words import counted, gathered, kpa, mm, mn, percent, place_mm, sure_kpa
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,6 +66,7 @@ def story(result: Reconstruction, beside: dict[str, Model] | None = None) -> say
     )
     became = f"{presses} became a model of {kpa(modulus, '.1f')} (Young's modulus; {surely})"
     yield (say.Sentence if result.doubt else say.Headline)(became, on=say.PAGE)
+    yield from (say.Detail(words) for words in _taken_as(result))
     yield from _meant(result)
     yield say.Next(next_steps(result))
     for finding in result.findings:
@@ -95,6 +96,21 @@ def _paper(result: Reconstruction, beside: dict[str, Model] | None) -> say.Story
     yield say.Section("Where the parameters hold", _places(result, name, other))
     yield say.Section("Modulus", _modulus(result, models, beside or {}))
     yield say.Section("Where this differs from the paper, and why", _differs(result))
+
+
+def _taken_as(result: Reconstruction) -> Iterator[str]:
+    """What else than a tip that sticks and one modulus was taken, as the presses ask for it."""
+    if result.slides:
+        yield (
+            f"the tip slides: its sideways force is {percent(result.sideways)} of a stuck one's, "
+            "so the modulus is by the force along the normal alone; `palpate diagnose` tells the friction"
+        )
+    if field := result.model.effects.get("stiffness_field"):
+        low, high = (kpa(result.young_modulus_pa * float(f(field["ratio"]))) for f in (np.min, np.max))
+        yield (
+            f"the modulus differs from place to place, {low} to {high}: held-out places are predicted better "
+            "than by one (--field homogeneous gives one)"
+        )
 
 
 def _taken(result: Reconstruction) -> str:
@@ -228,7 +244,7 @@ def _differs(result: Reconstruction) -> say.Story:
 def view(result: Reconstruction) -> View:
     """The object; each press as measured and as the model with its one modulus answers the same path."""
     model = result.model
-    shown = _shown(model)
+    shown = _shown(result)
     colourings, lines = usual_colourings(model), [Line("measured", local(shown, shown.force), "measured")]
     selected = 0
     force = _with_one_modulus(result, shown)
@@ -244,8 +260,9 @@ def view(result: Reconstruction) -> View:
     return view_of_presses(model, shown, colourings, lines, selected)
 
 
-def _shown(model: Model) -> Presses:
-    return low_passed(model.presses).window(0.03, 0.03)
+def _shown(result: Reconstruction) -> Presses:
+    fitted = result.model.presses if result.fitted_presses is None else result.fitted_presses
+    return low_passed(fitted).window(0.03, 0.03)
 
 
 def _with_one_modulus(result: Reconstruction, shown: Presses) -> np.ndarray | None:
@@ -318,7 +335,7 @@ def meaning(result: Reconstruction) -> str:
             f" Another exploration of the same object would be expected to find a modulus within "
             f"{100 * max(high / e - 1, 1 - low / e):.0f} % of this one."
         )
-    shown = _shown(model)
+    shown = _shown(result)
     force = _with_one_modulus(result, shown)
     if force is not None:
         misfit = float(np.sqrt((rms_by_press(shown, force - shown.force) ** 2).mean()))
@@ -448,6 +465,7 @@ KEYS: tuple[say.Key, ...] = (
     ("rejected", lambda result: _contacts(result.exploration.rejected)),
     "findings",
     "doubt",
+    "sideways_share=sideways",
     _held_out,
     "noise_n=exploration.noise_n",
     "force_delay_s=exploration.delay_s",

@@ -23,6 +23,7 @@ from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
 from palpate.render.fem.renderer import FemRenderer
+from palpate.render.force_error import error_figures, force_errors, said
 from palpate.render.press import Stroke, press, read_curve
 from palpate.render.scene import in_the_air
 from palpate.scenes.scene import FIND_M, load_scene
@@ -159,6 +160,19 @@ def test_the_band_is_wider_for_a_modulus_that_is_less_known(renderer):
         and (narrow < wide).all()
         and (narrow > 0).all()
     )
+
+
+def test_the_band_is_what_a_press_there_may_be_off_by(renderer):
+    """One press had two numbers: the page's held the modulus's interval, the command's did not."""
+    known, depth = copy.copy(renderer), 2e-3
+    known.model = renderer.model.with_material(young_modulus_ci95_pa=(18e3, 22e3))
+    surface, radius = renderer.contact.arrays, renderer.model.tool.tip_radius_m
+    row = int(np.argmax(surface.vertices[:, 2]))
+    centre = surface.vertices[row] + (radius - depth) * surface.normals[row]
+    figures = error_figures(force_errors(known, centre[None], np.array([[0.0, 0.0, 1.0]]), radius))
+    off = np.hypot(figures["force_error_n"], figures["modulus_error_n"])
+    assert force_band(known, np.array([depth]))[row, 0] == pytest.approx(off, rel=1e-6)
+    assert f"{1e3 * off:.3g} mN for the law and the modulus" in said(figures)
 
 
 def test_the_file_is_one_page_that_fetches_nothing(written):
