@@ -11,10 +11,10 @@ without it.
 
 --adapter NAME plants them in another simulator instead (`_adapter_flaws`): its settings made worse, its
 parameters wrong, over a control that is as resolved as can be afforded, and judged against that control
-(`diagnose --baseline`). A flaw is said by any name whose advice mends the setting that was changed (an
-element's size: mesh stiffness or contact nodes). What the control is named for is the simulator's own: it
-counts as a false alarm where the control's force is within 5 % of our law (rms), or where a parameter is
-named.
+given the same parameters (`diagnose --baseline`). A flaw is said by any name whose advice mends the setting
+that was changed (an element's size: mesh stiffness or contact nodes). What the control is named for is the
+simulator's own: it counts as a false alarm where the control's force is within 5 % of our law (rms), or where
+a parameter is named.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from benchmarks.timing import table
 from palpate.diagnosis.options import AttributionOptions, DiagnoseOptions
 from palpate.diagnosis.other_simulator.declared_parameters import KEYS, Stated
 from palpate.diagnosis.other_simulator.forces import Forces, ForcesOptions
-from palpate.diagnosis.other_simulator.pipeline import Asked, Base, diagnose_simulated
+from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import SimulatedGap
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import Diagnosis
@@ -197,7 +197,9 @@ def _adapter_row(
     truth = {"flaws": [[flaw.name, *change.values()] for flaw, change in planted]}
     salt = secrets.token_hex(16)
     sealed = digest(truth, salt)
-    base = Base(Forces(runs.block.t, control, adapter), CONTROLS[adapter].stated) if planted else None
+    # its best settings, given what it was given
+    given = force([each for each in planted if each[0].parameter is not None])
+    base = Forces(runs.block.t, given, adapter) if planted else None
     verdict = _verdict(world, Forces(runs.block.t, whole, adapter), simulation.stated, base)
     named = _named(verdict)
     off = rms(control - runs.law) / rms(runs.law)
@@ -301,7 +303,7 @@ def _judged(
     return _Case(number, tuple(planted), sizes, left, sealed, salt, verdict, world.late)
 
 
-def _verdict(world: _Reality, forces: Forces, stated: Stated, base: Base | None = None) -> SimulatedGap:
+def _verdict(world: _Reality, forces: Forces, stated: Stated, base: Forces | None = None) -> SimulatedGap:
     """What is said, of nothing but the forces and what the simulation was given; and of its base."""
     return diagnose_simulated(
         world.recording, world.model, Asked(forces, stated, ForcesOptions(clock_offset_s=0.0), base=base),

@@ -5,7 +5,8 @@ too stiff, and seems to mend it. So where its force at its best settings is know
 diagnosed first: at each place it has a curve of its own, so much force where our law has so much. Whatever is
 changed changes that curve's force: a contact that gives is felt at a lesser depth of it. So a force that is
 asked about is read off the curve as our law's, less what the curve leaves, and what is left beside our law is
-what was changed.
+what was changed. Both runs are given the same parameters, right or wrong: what a mesh is off by changes with
+Poisson's ratio, and only the recording says that a parameter is wrong.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ import numpy as np
 
 from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.other_simulator.against_law import Numerics
-from palpate.diagnosis.other_simulator.declared_parameters import Stated
 from palpate.diagnosis.other_simulator.forces import Aligned
 from palpate.diagnosis.other_simulator.gap_decomposition import GapSums, StatedParameter
 from palpate.diagnosis.other_simulator.paired_presses import Sides, named_numerics
@@ -49,26 +49,23 @@ def with_same_presses(one: Aligned, two: Aligned) -> tuple[Aligned, Aligned]:
 
 @dataclass(frozen=True)
 class Own:
-    """stated: what the simulator was given at its best; base, law: (n, 3) N, local, its force there and our
-    law's; curves: by place (k,) N of either, increasing from 0; site: (n,) the place of each row; numerics:
-    what the base was named."""
+    """base, law: (n, 3) N, local, the simulator's force at its best and our law's; curves: by place (k,) N of
+    either, increasing from 0; site: (n,) the place of each row; numerics: what the base was named."""
 
-    stated: Stated
     base: np.ndarray
     law: np.ndarray
     curves: dict[int, tuple[np.ndarray, np.ndarray]]
     site: np.ndarray
     numerics: Numerics
 
-    def force(self, stated: Stated) -> np.ndarray:
-        """(n, 3) N that it adds where other parameters are given: all force is in proportion to the
-        modulus."""
-        return (self.base - self.law) * self._level(stated)
+    @property
+    def force(self) -> np.ndarray:
+        """(n, 3) N that it adds."""
+        return self.base - self.law
 
-    def without(self, force: np.ndarray, stated: Stated) -> np.ndarray:
+    def without(self, force: np.ndarray) -> np.ndarray:
         """(n, 3) N that our law would have: the simulator's force (n, 3) N without what is its own."""
-        level = self._level(stated)
-        return level * (self._read(force / level) + self.law - self._read_base)
+        return self._read(force) + self.law - self._read_base
 
     def times(self) -> np.ndarray:
         """(n, 1) how many times our law's force the simulator's is."""
@@ -76,12 +73,9 @@ class Own:
         size = np.linalg.norm(self.base, axis=1)
         return np.where(read > 0, size / np.maximum(read, 1e-12), 1.0)[:, None]
 
-    def at(self, stated: Stated, weighing: GapSums) -> OwnFlaws:
+    def at(self, weighing: GapSums) -> OwnFlaws:
         """What is said of it."""
-        return OwnFlaws(self.numerics.named, self.numerics.candidates, weighing.rms_n(self.force(stated)))
-
-    def _level(self, stated: Stated) -> float:
-        return stated.young_modulus_pa / self.stated.young_modulus_pa
+        return OwnFlaws(self.numerics.named, self.numerics.candidates, weighing.rms_n(self.force))
 
     @cached_property
     def _read_base(self) -> np.ndarray:
@@ -111,14 +105,13 @@ def own_of(sides: Sides, rules: AttributionOptions, progress: Progress) -> Own:
         parts = np.array_split(rows[np.argsort(own[rows], kind="stable")], min(_KNOTS, len(rows)))
         knots = np.array([[0.0, 0.0], *([np.median(own[p]), np.median(law[p])] for p in parts)])
         curves[int(place)] = knots[:, 0], np.maximum.accumulate(knots[:, 1])
-    return Own(sides.forward.stated, base, found.law, curves, site, found)
+    return Own(base, found.law, curves, site, found)
 
 
 def made_up(
     numerics: Numerics,
     wrong: Sequence[StatedParameter],
     own: Own | None,
-    stated: Stated,
     weighing: GapSums,
     least_n: float,
 ) -> tuple[MadeUp, ...]:
@@ -128,7 +121,7 @@ def made_up(
     # what a parameter takes off the gap is what was missing: given wrongly it adds the contrary
     forces |= {p.name: -p.force for p in wrong}
     if own is not None:
-        forces[OWN] = own.force(stated)
+        forces[OWN] = own.force
     found = []
     for (one, a), (two, b) in itertools.combinations(forces.items(), 2):
         alone = weighing.rms_n(a), weighing.rms_n(b)

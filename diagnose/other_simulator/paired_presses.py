@@ -84,10 +84,10 @@ def _without(sides: Sides, own: Own) -> Sides:
     """The same without what the simulator has of its own."""
     forward = copy.copy(sides.forward)
     t = forward.touches
-    local = own.without(t.local_force, forward.stated)
+    local = own.without(t.local_force)
     turned = np.einsum("nij,ni->nj", t.frame[t.press], local)
     forward.touches = dataclasses.replace(t, force=turned)
-    return dataclasses.replace(sides, forward=forward, raw=own.without(sides.raw, forward.stated))
+    return dataclasses.replace(sides, forward=forward, raw=own.without(sides.raw))
 
 
 def _named(

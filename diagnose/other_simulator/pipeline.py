@@ -47,18 +47,10 @@ LIKELIER = 0.5
 
 
 @dataclasses.dataclass(frozen=True)
-class Base:
-    """The same simulator's forces at its best settings along the same path, and what it was given there."""
-
-    forces: Forces
-    stated: Stated
-
-
-@dataclasses.dataclass(frozen=True)
 class Asked:
     """What is asked of a simulation: its forces, what it was given, how the file is meant; of one run here
-    its version, advice by numerical effect, settings in words, and greatest Poisson's ratio; the base that it
-    is judged against."""
+    its version, advice by numerical effect, settings in words, and greatest Poisson's ratio; base: the same
+    simulator's forces at its best settings along the same path, given the same."""
 
     forces: Forces
     stated: Stated
@@ -67,7 +59,7 @@ class Asked:
     advice: dict[str, str] = dataclasses.field(default_factory=dict)
     run_as: str = ""
     poisson_limit: float = math.inf
-    base: Base | None = None
+    base: Forces | None = None
 
 
 def diagnose_simulated(
@@ -99,12 +91,11 @@ def diagnose_simulated(
             recording, model, options, part(progress, 0.0, 0.6), nuisance=nuisance, attribution=attribution
         )
     findings: Findings = reality.findings
-    own, base = None, asked.base
-    if base is not None:
-        level = base.stated.young_modulus_pa / model.material.young_modulus_pa
-        best = aligned(base.forces, presses, asked.options, level)
+    own = None
+    if asked.base is not None:
+        best = aligned(asked.base, presses, asked.options, level)
         given, best = with_same_presses(given, best)
-        own = own_of(pair_forces(best, findings, base.stated), rules, part(progress, 0.6, 0.75))
+        own = own_of(pair_forces(best, findings, asked.stated), rules, part(progress, 0.6, 0.75))
     sides = pair_forces(given, findings, asked.stated)
     numerics = named_numerics(sides, rules, part(progress, 0.75, 0.95), own)
     result = _concluded(_weighed(asked, options, rules, reality, sides, numerics, own))
@@ -249,9 +240,9 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         touches=forward.touches,
         gaps=w.gaps,
         simulated=w.sides.raw,
-        own=None if w.own is None else w.own.at(w.asked.stated, w.weighing),
+        own=None if w.own is None else w.own.at(w.weighing),
         coarse=coarse,
-        made_up=made_up(w.numerics, w.wrong, w.own, w.asked.stated, w.weighing, w.least_n),
+        made_up=made_up(w.numerics, w.wrong, w.own, w.weighing, w.least_n),
     )  # fmt: skip
 
 

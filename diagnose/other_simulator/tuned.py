@@ -31,14 +31,21 @@ class Moved:
 
 @dataclass(frozen=True)
 class Unseen:
-    """A shape that was not tuned on: N rms off its true force before and after (NaN: not pressed); N rms of
-    its bound, and of the force."""
+    """A shape that was not tuned on: N rms off its true force before and after (NaN: not pressed), and after
+    off before; N rms of its bound, and of the force."""
 
     name: str
     gap_before_n: float
     gap_after_n: float
+    apart_n: float
     bound_n: float
     force_n: float
+
+    @property
+    def farther(self) -> bool:
+        """Whether it is farther off than before wherever the true force lies within its bound. Forces that
+        are as far from one as from the other lie on a plane; nothing is known where the bound reaches it."""
+        return self.gap_after_n**2 - self.gap_before_n**2 > 2 * self.bound_n * self.apart_n
 
 
 @dataclass(frozen=True)
@@ -102,10 +109,10 @@ class Tuned(Result):
 
     @property
     def worse(self) -> tuple[str, ...]:
-        """What was not tuned on and is farther off than before, and than its force is known to."""
+        """What was not tuned on and is known to be farther off than before: presses by more than was asked,
+        shapes wherever their force lies within its bound."""
         held = self.gap_after_n > max(self.gap_before_n, self.target_n)
-        shapes = [s.name for s in self.unseen if s.gap_after_n > max(s.gap_before_n, s.bound_n)]
-        return (*([HELD] if held else []), *shapes)
+        return (*([HELD] if held else []), *(s.name for s in self.unseen if s.farther))
 
 
 @dataclass(frozen=True)
@@ -120,6 +127,12 @@ class Judged:
 def off(runs: Runs, values: Values, paths: Sequence[TruePath], progress: Progress = silent) -> Sums:
     """What settings miss of some paths, together."""
     return sum((runs.run(values, path, progress).sums for path in paths), Sums())
+
+
+def apart_n(runs: Runs, one: Values, two: Values, path: TruePath) -> float:
+    """N rms by which the forces of two settings differ along a path that both were run on."""
+    rests = [runs.run(values, path).rest for values in (one, two)]
+    return math.sqrt(((rests[0] - rests[1]) ** 2).sum() / len(path.force))
 
 
 def start_of(adapter: Adapter) -> dict[str, float]:
@@ -248,8 +261,9 @@ def tuned(
         gap_after_n=_gap_n(after, HELD) if judged.held else 0.0,
         unseen=tuple(
             Unseen(
-                p.name, _gap_n(before, p.name), _gap_n(after, p.name), p.bound_n or 0.0,
-                math.sqrt((p.force**2).sum() / len(p.force)),
+                p.name, _gap_n(before, p.name), _gap_n(after, p.name),
+                apart_n(runs, start, best.values, p) if p.name in after else math.nan,
+                p.bound_n or 0.0, math.sqrt((p.force**2).sum() / len(p.force)),
             )
             for p in judged.unseen
         ),

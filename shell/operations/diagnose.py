@@ -97,8 +97,8 @@ def diagnose(
     baseline: Annotated[
         Any,
         option(
-            "judge it against the same simulator at its best: of --simulated those forces, BASE.csv (the "
-            "object as the model says); of --renderer its settings, as for --mended",
+            "judge it against the same simulator at its best: of --simulated those forces, BASE.csv (given "
+            "the same parameters); of --renderer its settings, as for --mended",
             metavar="BASE",
         ),
     ] = None,
@@ -191,12 +191,11 @@ def diagnose(
             result = diagnosed(measured, made, options, rest, **rules)
         else:
             from palpate.diagnosis.other_simulator.declared_parameters import stated_of
-            from palpate.diagnosis.other_simulator.pipeline import Asked, Base, diagnose_simulated
+            from palpate.diagnosis.other_simulator.pipeline import Asked, diagnose_simulated
             from palpate.diagnosis.other_simulator.result import Mended
 
             if forces is not None:
-                base = None if best is None else Base(best, stated_of({}, made))
-                simulation = Asked(forces, stated_of(stated, made), of_forces, base=base)
+                simulation = Asked(forces, stated_of(stated, made), of_forces, base=best)
                 result = diagnose_simulated(measured, made, simulation, options, rest, **rules)
             else:
                 assert renderer is not None
@@ -212,7 +211,7 @@ def diagnose(
                 )
                 first, again = simulations[0], simulations[1:]
                 if baseline is not None:
-                    first, again = replace(first, base=Base(again[0].forces, again[0].stated)), again[1:]
+                    first, again = replace(first, base=again[0].forces), again[1:]
                 result = diagnose_simulated(
                     measured, made, first, options, part(rest_of_it, 0.5, 0.9), **rules
                 )

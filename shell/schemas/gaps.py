@@ -178,7 +178,7 @@ _STATE = {
 _MOVED = table(name=TEXT, before=MAYBE, after=MAYBE, term=TEXT)
 _UNSEEN = table(
     name=TEXT,
-    **dict.fromkeys(("gap_before_n", "gap_after_n"), MAYBE),
+    **dict.fromkeys(("gap_before_n", "gap_after_n", "apart_n"), MAYBE),
     **dict.fromkeys(("bound_n", "force_n"), NUMBER),
 )
 _PRICED = table(ms_per_step=NUMBER, s_per_s=NUMBER, gap_n=NUMBER, moved=named(MAYBE))

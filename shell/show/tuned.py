@@ -80,10 +80,9 @@ def _certified(result: Tuned) -> str:
     if not result.worse:
         if result.undone:
             return f"{lacks}whether it carries over to them is not known"
-        return "it carries over: nowhere is the error larger than before and than its force is known to"
-    return (
-        f"{lacks}it does not carry over to {listed(result.worse)}: farther off than before, and than is known"
-    )
+        return "it carries over: as far as each force is known, nowhere is the error larger than before"
+    farther = "farther off than before, wherever the force lies within what is known"
+    return f"{lacks}it does not carry over to {listed(result.worse)}: {farther}"
 
 
 def _unreached(result: Tuned) -> str:

@@ -25,7 +25,7 @@ from palpate.diagnosis.other_simulator.forces import (
     spread_out,
 )
 from palpate.diagnosis.other_simulator.gap_decomposition import PARAMETER_OF, StatedParameter
-from palpate.diagnosis.other_simulator.pipeline import Asked, Base, _Weighed, diagnose_simulated
+from palpate.diagnosis.other_simulator.pipeline import Asked, _Weighed, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import EffectEntry
@@ -149,11 +149,11 @@ def test_a_tip_held_by_a_spring_is_contact_stiffness_with_that_springs(world):
     assert found.parameters["stiffness_n_per_m"] == pytest.approx(1000.0, rel=0.06)
 
 
-def _half_too_stiff(world, *, compliance=0.0, **given):
+def _half_too_stiff(world, *, ratio=1.5, compliance=0.0, **given):
     """Forces of a simulator whose mesh is half too stiff, its tip on a spring of so many m/N; what it was
     given."""
     real, stated = world[2].forward, stated_of(given, world[1])
-    stiff = stated.but("young_modulus_pa", 1.5 * stated.young_modulus_pa)
+    stiff = stated.but("young_modulus_pa", ratio * stated.young_modulus_pa)
     forward = StatedForward(real.touches, real.places, stiff)
     settings = forward.ideal(1.0)
     settings.tool_compliance += compliance
@@ -162,7 +162,7 @@ def _half_too_stiff(world, *, compliance=0.0, **given):
 
 
 def _judged(world, run, base=None):
-    asked = Asked(*run, OWN_CLOCK, base=None if base is None else Base(*base))
+    asked = Asked(*run, OWN_CLOCK, base=base)
     return diagnose_simulated(*world[:2], asked, FAST, reality=world[2])
 
 
@@ -170,7 +170,7 @@ def _judged(world, run, base=None):
 def test_a_simulator_that_is_off_already_is_judged_against_its_best(world):
     """Its mesh is half too stiff at its best, and a contact that is then made soft takes some of that off."""
     base, soft = _half_too_stiff(world), _half_too_stiff(world, compliance=1e-3)
-    alone, result = _judged(world, soft), _judged(world, soft, base)
+    alone, result = _judged(world, soft), _judged(world, soft, base[0])
     assert alone.effects != ("contact_stiffness",)  # what is asked for is what was changed
     # the power of the depth is how its contact is made: no setting changes it
     weighed = [{e.name for e in each.entries} for each in (alone, result)]
@@ -180,16 +180,23 @@ def test_a_simulator_that_is_off_already_is_judged_against_its_best(world):
     (pair,) = result.made_up
     assert set(pair.effects) == {"contact_stiffness", "its own"} and pair.together_n < max(pair.alone_n)
     assert "make up for each other" in "\n".join(result.lines())
-    unchanged = _judged(world, base, base)
+    unchanged = _judged(world, base, base[0])
     assert unchanged.effects == () and unchanged.made_up == ()
 
 
 @pytest.mark.slow
 def test_what_a_simulator_that_is_off_is_given_wrongly_acts_on_its_own_force(world):
     """A tip a fifth too small takes its share of a force that is half too great, and is all that is named."""
-    small = {"tip_radius_m": 0.8 * world[1].tool.tip_radius_m}
-    result = _judged(world, _half_too_stiff(world, **small), _half_too_stiff(world))
-    assert result.effects == ("stated_tip_radius",)
+    small = _half_too_stiff(world, tip_radius_m=0.8 * world[1].tool.tip_radius_m)
+    assert _judged(world, small, small[0]).effects == ("stated_tip_radius",)
+
+
+@pytest.mark.slow
+def test_a_mesh_that_is_off_by_less_at_a_wrong_poisson_ratio_is_not_the_parameters_flaw(world):
+    """It locks less the more the solid gives way in volume: half too stiff at the right one, a fifth here."""
+    wrong = _half_too_stiff(world, ratio=1.2, poisson_ratio=0.3)
+    result = _judged(world, wrong, wrong[0])
+    assert result.effects == ("stated_poisson_ratio",) and result.own.effects == ("mesh_stiffness",)
 
 
 @pytest.mark.slow

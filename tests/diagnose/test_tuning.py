@@ -250,6 +250,19 @@ def test_the_certificate_is_of_what_was_not_tuned_on(springs):
     assert isinstance(found, pp.Tuned) and "does not carry over to soft" in str(found)
 
 
+@pytest.mark.parametrize(("known_to", "farther"), [(60.0, ()), (30.0, ("between",))])
+def test_a_shape_is_farther_off_only_where_its_force_is_known_well_enough_to_tell(springs, known_to, farther):
+    # 160 N/m, tuned from 100 to 300: forces of 200 N/m and more are nearer to what was tuned
+    runs, between = Runs("springs", RenderOptions()), press(springs, 0.002, 160.0, 1.0)
+    bound_n = known_to / 160.0 * np.sqrt((between.force**2).sum() / len(between.force))
+    between = replace(between, name="between", bound_n=bound_n)
+    found = tuned(
+        runs, springs, Judged([press(springs, 0.002)], [], [between]), noise_n=0.005, law_n=0.0, within_s=60.0
+    )
+    assert found.unseen[0].gap_after_n > 2 * found.unseen[0].gap_before_n
+    assert found.unseen[0].gap_after_n > bound_n and found.worse == farther
+
+
 def said(found):
     import_module("palpate.show")  # a result says itself once that is there
     return "\n".join(found.lines())
