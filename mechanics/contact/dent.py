@@ -44,6 +44,9 @@ Of the usual one's bracing six solved places (flanks, a layer) ask for 0.84 at 0
 0.30."""
 STIFFEST = 0.8
 """Of a contact's own compliance, the most that what is stiff close below may take away."""
+_TOLD = 1e-3
+"""Share of the force that a tip without friction loses by slipping from which the solutions tell how much of
+that friction leaves."""
 GRIPS = 0.7
 """Coulomb's friction from which a tip that goes straight in sticks."""
 
@@ -124,7 +127,10 @@ def slipping(name: str, poisson_ratio: float, friction: float) -> np.ndarray:
     kept = PchipInterpolator(np.append(frictions, GRIPS), np.vstack([share, np.ones(_STEPS + 1)]))(friction)
     if name != "linear":
         return kept
-    slips = (1 - kept) / np.maximum(1 - share[0], 1e-9)
+    # shallow dents of a compressible solid lose less than the solutions can tell: there the share is that of
+    # the first depth that tells it
+    told = 1 - share[0] > _TOLD
+    slips = np.interp(grid(), grid()[told], ((1 - kept) / np.maximum(1 - share[0], _TOLD))[told])
     return 1 - slips * np.maximum(1 - _sphere()[0][0] / _tabulated(name, poisson_ratio)[0][0], 0.0)
 
 

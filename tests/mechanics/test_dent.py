@@ -122,6 +122,16 @@ def test_axisymmetric_solution_meets_punches_and_the_tables():
         assert plane_strain_modulus(1.0, NU) > 1
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.02, 0.1, 0.3])
+@pytest.mark.parametrize("nu", [0.1, 0.3, 0.4, 0.49])
+@pytest.mark.parametrize("law", ["linear", "neo-hookean"])
+def test_the_force_of_a_tip_that_slips_grows_smoothly(law, nu, friction):
+    """A jump of 4 % stood at a quarter of the radius where nu was 0.1 and friction 0.02."""
+    c = dent_law(law, nu, friction).table[1:, 0]
+    assert (np.diff(c * grid()[1:] ** 1.5) > 0).all()
+    assert np.abs(np.diff(c) / c[1:]).max() < 0.01
+
+
 def test_a_tip_that_slips_is_pushed_back_less_the_deeper_it_goes():
     deep = R * np.array([0.25, 1.0, 2.0])
     for name in ("linear", "neo-hookean"):
