@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.effects import stiffness_field
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.operations._written import open_words
@@ -105,7 +106,7 @@ def _taken_as(result: Reconstruction) -> Iterator[str]:
             f"the tip slides: its sideways force is {percent(result.sideways)} of a stuck one's, "
             "so the modulus is by the force along the normal alone; `palpate diagnose` tells the friction"
         )
-    if field := result.model.effects.get("stiffness_field"):
+    if field := result.model.effects.get(stiffness_field.EFFECT.name):
         low, high = (kpa(result.young_modulus_pa * float(f(field["ratio"]))) for f in (np.min, np.max))
         yield (
             f"the modulus differs from place to place, {low} to {high}: held-out places are predicted better "
