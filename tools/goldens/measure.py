@@ -14,7 +14,7 @@ from typing import Any
 from platformdirs import user_cache_path
 
 from tools.goldens.cases import CASES, Case
-from tools.goldens.plain import Plain
+from tools.goldens.plain import WAIT, Plain
 
 INSIDE = Path(__file__).with_name("inside.py")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -81,7 +81,7 @@ class Measured:
                 "command": " ".join(["palpate", line]).rstrip(),
                 "exit": each["exit"],
                 "stdout": self._out(each["stdout"]),
-                "stderr": self.plain.lines(each["stderr"]),
+                "stderr": self.plain.lines(WAIT.sub("", each["stderr"])),
             }
             for line, each in zip(case.lines, ran, strict=True)
         ]
