@@ -74,7 +74,7 @@ def named_numerics(
     if own is None:
         return _named(sides, rules, progress)
     without = _without(sides, own)
-    found, times = _named(without, rules, progress, beside_own=True), own.times()
+    found, times = _named(without, rules, progress, own), own.times()
     force = {name: times * each for name, each in found.force.items()}
     force["all"] = found.force["all"] + sides.raw - without.raw
     return dataclasses.replace(found, force=force)
@@ -87,12 +87,11 @@ def _without(sides: Sides, own: Own) -> Sides:
     local = own.without(t.local_force)
     turned = np.einsum("nij,ni->nj", t.frame[t.press], local)
     forward.touches = dataclasses.replace(t, force=turned)
-    return dataclasses.replace(sides, forward=forward, raw=own.without(sides.raw))
+    # what samples lost is the same beside any law
+    return dataclasses.replace(sides, forward=forward, raw=local + sides.raw - t.local_force)
 
 
-def _named(
-    sides: Sides, rules: AttributionOptions, progress: Progress, *, beside_own: bool = False
-) -> Numerics:
+def _named(sides: Sides, rules: AttributionOptions, progress: Progress, own: Own | None = None) -> Numerics:
     """What is named against the law. Presses that the tip fell through have a say until they did, where that
     is long enough, and get the law's force with what was named from there on."""
     forward, t = sides.forward, sides.forward.touches
@@ -104,10 +103,10 @@ def _named(
         cut, held = t, np.ones(len(t), bool)
     sides = dataclasses.replace(sides, fell_s=np.where(held, sides.fell_s, -np.inf))
     if held.all() and np.isinf(sides.fell_s).all():
-        return _with_seen(sides, numerics_of(forward, rules, progress, beside_own=beside_own))
+        return _with_seen(sides, numerics_of(forward, rules, progress, beside_own=own is not None), own)
     of_held = dataclasses.replace(forward, touches=cut).of(held)
-    found = numerics_of(of_held, rules, progress, beside_own=beside_own)
-    return _with_seen(sides, _over_all(sides, found, held))
+    found = numerics_of(of_held, rules, progress, beside_own=own is not None)
+    return _with_seen(sides, _over_all(sides, found, held), own)
 
 
 def _over_all(sides: Sides, found: Numerics, held: np.ndarray) -> Numerics:
@@ -124,8 +123,9 @@ def _over_all(sides: Sides, found: Numerics, held: np.ndarray) -> Numerics:
     return dataclasses.replace(found, law=law, with_numerics=together, force=force)
 
 
-def _with_seen(sides: Sides, found: Numerics) -> Numerics:
-    """With what the samples themselves showed, where it matters."""
+def _with_seen(sides: Sides, found: Numerics, own: Own | None) -> Numerics:
+    """With what the samples themselves showed, where it matters: as far as it exceeds what the simulator's
+    own do at its best."""
     t = sides.forward.touches
     fell = t.t >= sides.fell_s[t.press]
     mended = np.where(fell[:, None], found.with_numerics, t.local_force)
@@ -133,12 +133,15 @@ def _with_seen(sides: Sides, found: Numerics) -> Numerics:
         "lost_contact": np.where(fell[:, None], 0.0, sides.raw - t.local_force),
         "tunnelling": np.where(fell[:, None], sides.raw - found.with_numerics, 0.0),
     }
-    typical = float(np.sqrt((mended[t.counted] ** 2).sum(axis=1).mean()))
-    sizes = {n: float(np.sqrt((f[t.counted] ** 2).sum(axis=1).mean())) for n, f in parts.items()}
+    typical = _rms(mended[t.counted])
+    sizes = {n: _rms(f[t.counted]) for n, f in parts.items()}
+    if own is not None:
+        for name in sizes.keys() & set(own.numerics.named):
+            sizes[name] -= _rms(own.numerics.force[name][t.counted])
     named = [n for n in sides.seen if sizes[n] > LEAST_SHARE * typical]
     all_of = found.force["all"] + sum((parts[n] for n in named), np.zeros_like(mended))
     strength = {n: float((found.force[n][t.counted] ** 2).sum()) for n in found.named}
-    strength |= {n: float((parts[n][t.counted] ** 2).sum()) for n in named}
+    strength |= {n: sizes[n] ** 2 * t.counted.sum() for n in named}
     order = tuple(sorted(strength, key=lambda n: -strength[n]))
     # a tip that is never felt at a place may go between nodes there
     between = "tunnelling" in named and sides.seen["tunnelling"]["never_felt"] > 0
@@ -151,3 +154,8 @@ def _with_seen(sides: Sides, found: Numerics) -> Numerics:
         probability={**found.probability, **{n: 1.0 if n in named else 0.0 for n in sides.seen}},
         force={**found.force, **{n: parts[n] for n in sides.seen}, "all": all_of},
     )
+
+
+def _rms(force: np.ndarray) -> float:
+    """N of (n, 3) N."""
+    return float(np.sqrt((force**2).sum(axis=1).mean()))

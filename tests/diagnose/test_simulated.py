@@ -185,6 +185,23 @@ def test_a_simulator_that_is_off_already_is_judged_against_its_best(world):
 
 
 @pytest.mark.slow
+def test_a_contact_that_flickers_at_its_best_too_is_its_own(world):
+    """Drake's own contact loses a sample in six: whatever was changed, that came first."""
+
+    def flickering(run, seed):
+        force, stated = run
+        gone = np.random.default_rng(seed).random(len(force.t)) < 1 / 6
+        return dataclasses.replace(force, force=np.where(gone[:, None], 0.0, force.force)), stated
+
+    base = flickering(_half_too_stiff(world, ratio=1.0), 0)
+    soft = flickering(_half_too_stiff(world, ratio=1.0, compliance=1e-3), 1)
+    assert _judged(world, soft).effects[0] == "lost_contact"
+    result = _judged(world, soft, base[0])
+    assert "contact_stiffness" in result.effects and "lost_contact" not in result.effects
+    assert "lost_contact" in result.own.effects
+
+
+@pytest.mark.slow
 def test_what_a_simulator_that_is_off_is_given_wrongly_acts_on_its_own_force(world):
     """A tip a fifth too small takes its share of a force that is half too great, and is all that is named."""
     small = _half_too_stiff(world, tip_radius_m=0.8 * world[1].tool.tip_radius_m)
