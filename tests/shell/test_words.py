@@ -75,7 +75,7 @@ def test_a_touch_says_what_was_made_of_an_open_surface(block):
     mended = block.replaced(provenance={**block.provenance, "mended": "filled by its winding number"})
     told = {}
     for model in (block, mended):
-        report = SimpleNamespace(text=lambda sent: "", as_dict=dict)
+        report = SimpleNamespace(text=lambda **_: "", as_dict=dict)
         servo, table = SimpleNamespace(failure=""), SimpleNamespace(state={}, words="")
         session = SimpleNamespace(
             model=model, report=lambda r=report: r, servo=servo, table=table, renderer_name="fem"
