@@ -25,20 +25,26 @@ from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.plausible import USUAL_POISSON_RATIO
-from palpate.mechanics.shape.nearest import first_hits
+from palpate.mechanics.shape.nearest import facings, first_hits
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.render.base import Renderer
 from palpate.render.effects import rendered_touch
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.options import RenderOptions
+from palpate.render.surface.bvh import STACK, closest_triangle
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.render.surface.snapping import ONSET_NOISE_M, is_given
+from palpate.render.surface.walking import foot
 
 SURE = 1.96
 COARSE_DEPTH, _STEPS = 0.6, 7
 """Of the press by which a coarse table's error is stated, in tip radii; and its steps."""
 _SAGITTA = 0.05
 """Tip radii: what is as near is the surface itself, or the support."""
+_BESIDE_RIM = 0.01
+"""How near a rim is (mechanics.contact.edges.nearness) within whose strip a normal may turn."""
+_BETWEEN = 1 - np.sqrt(0.5)
+"""What the normal between the faces of a right-angled rim is turned by, as one less a cosine."""
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
 
@@ -75,8 +81,9 @@ def force_errors(
     sd = uncertain[near] if len(uncertain) == len(surface.vertices) else np.zeros(len(size))
     measured = len(renderer.model.presses) and not is_given(renderer.model)
     onset = ONSET_NOISE_M if measured else 0.0
+    law = np.hypot(shares * size, _on_rims(renderer, position, size, numbers[2], tip_radius_m))
     return ForceErrors(
-        shares * size,
+        law,
         modulus_share(renderer.model) * size,
         SURE * sd * steepness,
         SURE * onset * steepness,
@@ -87,6 +94,38 @@ def modulus_share(model: Model) -> float:
     """Half width of the modulus's 95 % interval over it; 0 of one that is stated and not measured."""
     low, high = model.material.young_modulus_ci95_pa
     return 0.5 * (high - low) / model.material.young_modulus_pa if np.isfinite([low, high]).all() else 0.0
+
+
+def _on_rims(
+    renderer: FemRenderer, position: np.ndarray, size: np.ndarray, rim: np.ndarray, tip_radius_m: float
+) -> np.ndarray:
+    """(n,) N by which forces size (n,) N may be off on and beside sharp rims, how near they are (n,).
+
+    The contact normal turns within a strip (render.surface.shaped), so a tip beside a rim is felt when it
+    overlaps the object already, and one on it is felt as on plane ground.
+    """
+    surface, material = renderer.contact.arrays, renderer.model.material
+    beside = np.flatnonzero(rim > _BESIDE_RIM)
+    near, felt, turned = np.zeros((3, len(beside)))
+    weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
+    point, normal, move = np.zeros((3, 3))
+    for k, tip in enumerate(position[beside]):
+        triangle, distance = closest_triangle(
+            surface.bvh, surface.vertices, surface.triangles, tip, tip_radius_m, weights, stack
+        )
+        if triangle >= 0 and surface.free[triangle]:
+            near[k] = tip_radius_m - distance
+            triangle, height = foot(surface, triangle, weights, tip, point, normal, move)
+            felt[k] = tip_radius_m - height
+            facing = facings(surface.vertices, surface.triangles[triangle][None])[0][0]
+            turned[k] = (1 - normal @ facing / np.linalg.norm(facing)) / _BETWEEN
+    felt = np.clip(felt, 0.0, near)
+    hertz = 4 / 3 * material.young_modulus_pa / (1 - material.poisson_ratio**2) * np.sqrt(tip_radius_m)
+    late = Bound.late.value * hertz * (near**1.5 - felt**1.5)
+    edge = Bound.edge.value * turned * np.exp(-felt / (Bound.dented.value * tip_radius_m))
+    off = np.zeros(len(size))
+    off[beside] = np.hypot(late, edge * size[beside])
+    return off
 
 
 def error_figures(errors: ForceErrors | None) -> dict[str, float]:
