@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import palpate.render.exact
+import palpate.show
 from palpate.cli import main
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.press_solver import solved_places
