@@ -135,11 +135,12 @@ def _with_seen(sides: Sides, found: Numerics, own: Own | None) -> Numerics:
     }
     typical = _rms(mended[t.counted])
     sizes = {n: _rms(f[t.counted]) for n, f in parts.items()}
-    if own is not None:
-        for name in sizes.keys() & set(own.numerics.named):
-            sizes[name] -= _rms(own.numerics.force[name][t.counted])
+    its_own = set() if own is None else parts.keys() & set(own.numerics.named)
+    for name in its_own:
+        sizes[name] -= _rms(own.numerics.force[name][t.counted])
     named = [n for n in sides.seen if sizes[n] > LEAST_SHARE * typical]
-    all_of = found.force["all"] + sum((parts[n] for n in named), np.zeros_like(mended))
+    together = [n for n in sides.seen if n in its_own or n in named]
+    all_of = found.force["all"] + sum((parts[n] for n in together), np.zeros_like(mended))
     strength = {n: float((found.force[n][t.counted] ** 2).sum()) for n in found.named}
     strength |= {n: sizes[n] ** 2 * t.counted.sum() for n in named}
     order = tuple(sorted(strength, key=lambda n: -strength[n]))
