@@ -56,6 +56,14 @@ def pytest_sessionstart() -> None:
         )
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _waits_without_a_word() -> Iterator[None]:
+    """A command that a busy machine makes wait says so on standard error; tests of what it says do not."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("palpate.output.SILENT_S", 1e6)
+        yield
+
+
 def pytest_sessionfinish() -> None:
     """A folder of the checkout is no package: what imports it as one would load it a second time."""
     bare = {
