@@ -134,10 +134,9 @@ def _with_seen(sides: Sides, found: Numerics, own: Own | None) -> Numerics:
         "tunnelling": np.where(fell[:, None], sides.raw - found.with_numerics, 0.0),
     }
     typical = _rms(mended[t.counted])
-    sizes = {n: _rms(f[t.counted]) for n, f in parts.items()}
-    its_own = set() if own is None else parts.keys() & set(own.numerics.named)
-    for name in its_own:
-        sizes[name] -= _rms(own.numerics.force[name][t.counted])
+    known = None if own is None else own.numerics
+    its_own = {n: _rms(known.force[n][t.counted]) for n in parts if n in known.named} if known else {}
+    sizes = {n: _rms(f[t.counted]) - its_own.get(n, 0.0) for n, f in parts.items()}
     named = [n for n in sides.seen if sizes[n] > LEAST_SHARE * typical]
     together = [n for n in sides.seen if n in its_own or n in named]
     all_of = found.force["all"] + sum((parts[n] for n in together), np.zeros_like(mended))
