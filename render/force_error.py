@@ -20,6 +20,7 @@ from palpate.mechanics.compliance.sites import (
     surface_edge,
     uneven_curvature,
 )
+from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.contact.edges import ends_within, nearness
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
@@ -120,8 +121,9 @@ def _on_rims(
             facing = facings(surface.vertices, surface.triangles[triangle][None])[0][0]
             turned[k] = (1 - normal @ facing / np.linalg.norm(facing)) / _BETWEEN
     felt = np.clip(felt, 0.0, near)
-    hertz = 4 / 3 * material.young_modulus_pa / (1 - material.poisson_ratio**2) * np.sqrt(tip_radius_m)
-    late = Bound.late.value * hertz * (near**1.5 - felt**1.5)
+    given = (material.young_modulus_pa, material.poisson_ratio, tip_radius_m)
+    hertz = dent_law("hertz")
+    late = Bound.late.value * (hertz.force(near, *given) - hertz.force(felt, *given))
     edge = Bound.edge.value * turned * np.exp(-felt / (Bound.dented.value * tip_radius_m))
     off = np.zeros(len(size))
     off[beside] = np.hypot(late, edge * size[beside])

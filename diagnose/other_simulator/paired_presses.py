@@ -19,6 +19,7 @@ from palpate.diagnosis.other_simulator.gap_decomposition import law_at
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.mechanics.presses.table import MARGIN_S, Presses
 from palpate.mechanics.progress import Progress
+from palpate.render.replay import rms_n
 
 if TYPE_CHECKING:
     from palpate.diagnosis.other_simulator.own_flaws import Own
@@ -133,10 +134,10 @@ def _with_seen(sides: Sides, found: Numerics, own: Own | None) -> Numerics:
         "lost_contact": np.where(fell[:, None], 0.0, sides.raw - t.local_force),
         "tunnelling": np.where(fell[:, None], sides.raw - found.with_numerics, 0.0),
     }
-    typical = _rms(mended[t.counted])
+    typical = rms_n(mended[t.counted])
     known = None if own is None else own.numerics
-    its_own = {n: _rms(known.force[n][t.counted]) for n in parts if n in known.named} if known else {}
-    sizes = {n: _rms(f[t.counted]) - its_own.get(n, 0.0) for n, f in parts.items()}
+    its_own = {n: rms_n(known.force[n][t.counted]) for n in parts if n in known.named} if known else {}
+    sizes = {n: rms_n(f[t.counted]) - its_own.get(n, 0.0) for n, f in parts.items()}
     named = [n for n in sides.seen if sizes[n] > LEAST_SHARE * typical]
     together = [n for n in sides.seen if n in its_own or n in named]
     all_of = found.force["all"] + sum((parts[n] for n in together), np.zeros_like(mended))
@@ -154,8 +155,3 @@ def _with_seen(sides: Sides, found: Numerics, own: Own | None) -> Numerics:
         probability={**found.probability, **{n: 1.0 if n in named else 0.0 for n in sides.seen}},
         force={**found.force, **{n: parts[n] for n in sides.seen}, "all": all_of},
     )
-
-
-def _rms(force: np.ndarray) -> float:
-    """N of (n, 3) N."""
-    return float(np.sqrt((force**2).sum(axis=1).mean()))

@@ -29,15 +29,15 @@ DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last row holds
 _STEPS = 600
 BENT = (-0.3, 0.4)
 """Mean curvatures times the tip's radius that curved bodies were solved for; beyond, the nearest holds."""
+FINITE = "neo-hookean"
+"""The law at finite strain; the others are of linear bodies."""
 _RATIOS = {
     "linear": (0.10, 0.30, 0.40, USUAL_POISSON_RATIO),
-    "neo-hookean": (0.40, USUAL_POISSON_RATIO),
+    FINITE: (0.40, USUAL_POISSON_RATIO),
 }
 """Poisson's ratios that a sticking law is tabulated for; straight lines between and beyond."""
 
 
-FINITE = "neo-hookean"
-"""The law at finite strain; the others are of linear bodies."""
 _YIELDS = 0.35
 """Below the usual Poisson's ratio by which a base no longer braces: what lies over it gives way in volume.
 Of the usual one's bracing six solved places (flanks, a layer) ask for 0.84 at 0.45, 0.69 at 0.40, 0.47 at
@@ -130,7 +130,7 @@ def slipping(name: str, poisson_ratio: float, friction: float) -> np.ndarray:
     # shallow dents of a compressible solid lose less than the solutions can tell: there the share is that of
     # the first depth that tells it
     told = 1 - share[0] > _TOLD
-    slips = np.interp(grid(), grid()[told], ((1 - kept) / np.maximum(1 - share[0], _TOLD))[told])
+    slips = np.interp(grid(), grid()[told], (1 - kept[told]) / (1 - share[0][told]))
     return 1 - slips * np.maximum(1 - _sphere()[0][0] / _tabulated(name, poisson_ratio)[0][0], 0.0)
 
 
@@ -201,14 +201,14 @@ def _beyond_hertz() -> np.ndarray:
     return np.interp(grid(), x, slope) + last * np.maximum(grid() - x[-1], 0.0)
 
 
-_FOLLOWED = ("linear", "neo-hookean")
+_FOLLOWED = ("linear", FINITE)
 """Laws whose contact grips the tip and is followed to great depths, on curved surfaces too."""
 
 _LAWS: dict[str, Callable[[float], tuple[np.ndarray, str]]] = {
     "hertz": lambda nu: _hertz(),
     "sphere": lambda nu: _sphere(),
     "linear": lambda nu: _tabulated("linear", nu),
-    "neo-hookean": lambda nu: _tabulated("neo-hookean", nu),
+    FINITE: lambda nu: _tabulated(FINITE, nu),
 }
 
 

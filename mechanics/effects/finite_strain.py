@@ -3,11 +3,12 @@ depth."""
 
 import numpy as np
 
+from palpate.mechanics.contact.dent import FINITE
 from palpate.mechanics.effects.base import Effect, Role, Scope, no_keys
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
 from palpate.mechanics.model.model import Model
 
-LAW = "neo-hookean"
+LAW = FINITE
 
 
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:

@@ -34,7 +34,7 @@ def digest(data: bytes | str) -> str:
     return hashlib.sha256(data.encode() if isinstance(data, str) else data).hexdigest()[:16]
 
 
-WAIT = re.compile(r"^.*(?: left)? \.\.\.\n", re.MULTILINE)
+WAIT = re.compile(r"^.* \.\.\.\n", re.MULTILINE)
 """What a long wait says of itself (mechanics.progress): how often depends on the machine."""
 
 
