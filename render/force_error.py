@@ -139,15 +139,23 @@ def error_figures(errors: ForceErrors | None) -> dict[str, float]:
     return {key: float(np.sqrt(np.mean(np.square(part)))) for key, part in parts.items()}
 
 
-def said(figures: dict[str, float]) -> str:
-    """The figures in words; '' for none."""
+def said(figures: dict[str, float], *, from_touch: bool = False) -> str:
+    """The figures in words; '' for none. from_touch: the depth counts from first touch, wherever it lay."""
     if not figures:
         return ""
-    law, modulus, *others = figures.values()
-    shape, touch = (f"{1e3 * value:.3g}" for value in others)
+    law, modulus, shape, touch = (1e3 * value for value in figures.values())
+    ours, whole = np.hypot(law, modulus), np.linalg.norm([law, modulus, shape, touch])
+    named = "for the law and the modulus" if modulus else "for the law"
+    if whole == ours:
+        return f"may be off (95 %) by {ours:.3g} mN {named}"
+    if from_touch:
+        return (
+            f"may be off (95 %) by {ours:.3g} mN {named}, this deep from first touch; by {whole:.3g} mN at "
+            "this very position, as its surface may lie elsewhere"
+        )
     return (
-        f"may be off (95 %) by {1e3 * float(np.hypot(law, modulus)):.3g} mN for the law"
-        f"{' and the modulus' if modulus else ''}, {shape} for the shape, {touch} for its first touches"
+        f"may be off (95 %) by {whole:.3g} mN: {ours:.3g} {named}, {shape:.3g} for where its surface lies, "
+        f"{touch:.3g} for its first touches (squares add up)"
     )
 
 

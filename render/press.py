@@ -80,6 +80,17 @@ class Curve(Result):
         """Sample of the greatest depth."""
         return int(np.argmax(self.depth))
 
+    @property
+    def touched_at(self) -> np.ndarray:
+        """(3,) m, of the surface, where the tip first touched; of what was pressed, not read."""
+        assert self.normal is not None and self.tip_radius_m is not None, (
+            "a curve that was read knows no place"
+        )
+        felt = int(np.argmax(self.depth > 0))
+        along = self.position[felt] - self.position[felt - 1]
+        along /= -(along @ self.normal)
+        return self.position[felt] - self.depth[felt] * along - self.tip_radius_m * self.normal
+
     def save(self, path: Path | str) -> Path:
         """Write `t,x,y,z,depth,fx,fy,fz` (s, m, m, N), which `palpate press --expect` takes."""
         write_curve(path, self)
@@ -218,11 +229,7 @@ def check_start(scene: TouchScene, start: np.ndarray, touch: np.ndarray, radius:
 
 def solved(curve: Curve, exact: ExactPlaces) -> Curve:
     """The curve with its place solved. Raises OptionError where the solver finds no equilibrium there."""
-    normal, felt = np.asarray(curve.normal), int(np.argmax(curve.depth > 0))
-    along = curve.position[felt] - curve.position[felt - 1]
-    along /= -(along @ normal)
-    point = curve.position[felt] - curve.depth[felt] * along - exact.tip_m * normal
-    place = exact(point, normal, float(curve.depth.max()))
+    place = exact(curve.touched_at, np.asarray(curve.normal), float(curve.depth.max()))
     if place is None:
         raise OptionError(
             "this press cannot be solved (no equilibrium, or it meets the support): press less deep, or "

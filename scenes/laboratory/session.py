@@ -47,7 +47,9 @@ class SimulateOptions:
         "viscoelasticity: a law on the elastic force, or solved in the solid for every touch",
         choices=("quasi-linear", "solid"),
     )
-    finest_mm: float = option(3.0, "longest edge of the solid's elements next to the touch", unit="mm")
+    finest_mm: float = option(
+        Fineness.finest, "longest edge of the solid's elements next to the touch", unit="mm"
+    )
 
 
 @dataclass(frozen=True)

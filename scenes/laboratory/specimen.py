@@ -88,7 +88,7 @@ def ball(centre_m: Sequence[float], radius_m: float, ratio: float) -> Ball:
 class Fineness:
     """How fine the mesh is near a touch: finest mm within `reach` mm, growing by `growth` mm a mm beyond."""
 
-    finest: float = 3.0
+    finest: float = 2.0
     reach: float = 5.0
     growth: float = 0.7
 

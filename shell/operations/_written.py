@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from palpate.mechanics.options import flag_of
 from palpate.operations._declare import written
 from palpate.operations._run import command_operation
 from palpate.show.page import file_words
+
+if TYPE_CHECKING:
+    from palpate.mechanics.model.model import Model
 
 _OF_IMPORT = {"slab_m": "slab"}
 """What import calls by another name."""
@@ -35,6 +38,16 @@ def import_words(given: Mapping[str, Any], output: str) -> str:
     told = {_OF_IMPORT.get(name, name): value for name, value in given.items()}
     told["output"] = output
     return typed("import", {name: value for name, value in told.items() if name in fields})
+
+
+def reconstruct_words(recording: str, model: Model) -> str:
+    """The command `palpate reconstruct` of another recording of the object, by the geometry that a model was
+    made by."""
+    from palpate.reconstruction.geometry.stated import GeometryOptions
+
+    made = (model.provenance.get("options") or {}).get("geometry") or {}
+    told = {name: value for name, value in made.items() if value != getattr(GeometryOptions(), name, value)}
+    return typed("reconstruct", {"recording": recording, **told}) + " -o MODEL"
 
 
 def typed(name: str, given: Mapping[str, Any]) -> str:

@@ -233,10 +233,11 @@ def diagnose(
         call.then(partial(_applied, own, apply))
         following.append(f"next: feel it: palpate touch {typed_word(apply)}")
     if corrected:
+        from palpate.operations._written import reconstruct_words
+
+        assert own.model is not None, "of presses on a model"
         call.then(partial(_corrected, own, corrected))
-        following.append(
-            f"next: reconstruct what is left: palpate reconstruct {typed_word(corrected)} -o MODEL"
-        )
+        following.append(f"next: reconstruct what is left: {reconstruct_words(corrected, own.model)}")
     call.following = following or call.following
     call.then_report(result, report)
     return result

@@ -37,6 +37,7 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
     digits = max(3, 2 - int(np.floor(np.log10(np.abs(there).max()))) if there.any() else 3)
     force = ", ".join(f"{round(float(f), digits) + 0.0:g}" for f in there)
     normal = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in np.asarray(result.normal))
+    at = ", ".join(f"{round(float(v), 4) + 0.0:g}" for v in result.touched_at)
     made = result.renderer.model
     if result.on_support:
         low, high = (", ".join(f"{v:.3g}" for v in f(made.mesh.points, axis=0)) for f in (np.min, np.max))
@@ -51,12 +52,13 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
         f"tool is ({force}) N"
     )
     yield say.Detail(
-        f"the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s; the object's "
-        f"Young's modulus{part_words(made)} is {kpa(made.material.young_modulus_pa, '.4g')}"
+        f"pressed at ({at}) m, where the surface faces ({normal}); {len(result.t)} samples in "
+        f"{result.t[-1]:.3g} s; the object's Young's modulus{part_words(made)} is "
+        f"{kpa(made.material.young_modulus_pa, '.4g')}"
     )
     if result.unsettled:
         yield say.Sentence(unsettled_words(result.unsettled, len(result.t)))
-    if words := said(result.error_figures):
+    if words := said(result.error_figures, from_touch=True):
         yield say.Detail(words)
     if result.exact is not None:
         yield from _solved(result.exact)
@@ -70,8 +72,8 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
 def _solved(exact: SolvedPlace) -> say.Story:
     """Law, solution and bound along the depth."""
     yield say.Detail(
-        f"solved here, along the normal; the forces above are by it: {exact.solved_n[-1]:.3g} N at the "
-        f"deepest, where the law's table alone says {exact.law_n[-1]:.3g} N"
+        f"solved here, elastic and along the normal; the forces above are by it: {exact.solved_n[-1]:.3g} N "
+        f"at the deepest, where the law's table alone says {exact.law_n[-1]:.3g} N"
     )
     rows = zip(1e3 * exact.depth_m, exact.law_n, exact.solved_n, exact.error_n, strict=True)
     yield solved_rows("depth [mm]", rows)

@@ -58,6 +58,7 @@ WORDS = {  # of keys of STATED and of numerical effects; physical effects have t
     "stated": "given",
     "measured": "measured",
 }
+STICKING = "unlimited: the tip sticks"
 
 
 def as_diagnosis(result: SimulatedGap) -> Diagnosis:
@@ -120,7 +121,7 @@ def keys_in_words(entry: EffectEntry) -> str:
     one number of a mesh, and a list of a stiffness field."""
     keys = entry.parameters
     if entry.name in STATED:
-        return short({k: "none: it sticks" if v is None else v for k, v in keys.items()}, WORDS)
+        return short({k: STICKING if v is None else v for k, v in keys.items()}, WORDS)
     in_words = _effect(entry.name).keys_in_words
     if in_words is not None and keys:
         return in_words(keys)
@@ -226,7 +227,7 @@ def story(result: SimulatedGap) -> say.Story:
             "Taken off one after another, at held-out places: numerics, parameters, then what "
             f"every ideal simulation lacks. Of the remaining gap {percent(result.noise_share)} is the "
             f"sensor's "
-            f"noise and {percent(result.touch_share)} where exactly the object was first met.",
+            f"noise and {percent(max(result.touch_share, 0.0))} where exactly the object was first met.",
         )
         yield say.Section("How large is each part?", [bars])
     yield say.Section("What was the simulator given?", _stated(result))
@@ -255,7 +256,7 @@ def _parts(result: SimulatedGap) -> say.Story:
         cards.append((f"{begun(name)}: {MEANING[name]}", size, sentence(meant)))
     yield say.Detail(
         f"unexplained: {force_words(result.unexplained_n)}, {percent(result.unexplained)} (the sensor's "
-        f"noise {percent(result.noise_share)}, first touches {percent(result.touch_share)})",
+        f"noise {percent(result.noise_share)}, first touches {percent(max(result.touch_share, 0.0))})",
         on=say.TEXT,
     )
     yield say.Cards(cards)
@@ -341,7 +342,7 @@ def _given(result: SimulatedGap) -> list[tuple[str, str, str, str]]:
     rows = []
     for key, value in result.simulator.stated.as_json().items():
         words, factor, unit = plain_key(key, value)
-        rows.append((key, words, "none: it sticks" if value is None else number(value, factor), unit))
+        rows.append((key, words, STICKING if value is None else number(value, factor), unit))
     return rows
 
 
@@ -397,9 +398,7 @@ def _stated(result: SimulatedGap) -> say.Story:
         words, factor, unit = plain_key(key)
         entry = wrong.get(field[key])
         measured = "" if entry is None else entry.parameters["measured"]
-        shown = [
-            ("it sticks" if v is None else v if v == "" else number(v, factor)) for v in (value, measured)
-        ]
+        shown = [(STICKING if v is None else v if v == "" else number(v, factor)) for v in (value, measured)]
         said = "stated" if key in given.given else "not stated: the model's"
         own = "agrees" if key in given.given else "-"
         rows.append([words, shown[0], said, shown[1] or own, unit])

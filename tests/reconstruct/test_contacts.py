@@ -170,6 +170,15 @@ def test_a_surface_that_holds_on_to_the_leaving_tip_is_no_press():
     assert len(exploration.rejected) == 4
 
 
+def test_a_stated_tracing_is_no_contact_where_the_base_is_known(cylinder):
+    """With a known shape three spans of the tracing were reported as contacts that show no rise of force."""
+    recording, onsets = cylinder
+    traced = explore(recording)
+    known = explore(recording, boundary=traced.boundary)
+    assert recording.boundary_phase is not None and len(known.presses) == len(onsets)
+    assert known.rejected == traced.rejected
+
+
 def test_a_press_on_the_support_is_rejected_and_named():
     recording, onsets = explore_cylinder(support_press=True)
     exploration = explore(recording)

@@ -190,7 +190,8 @@ def find_first_touches(spans: ContactSpans, request: TouchRequest) -> FirstTouch
     boundary = request.base
     if boundary is None:
         boundary = spans.base(request.base_options)
-        touching[: spans.tracing[1]] = False
+    if request.base is None or stated_tracing(recording) is not None:
+        touching[: spans.traced[1]] = False
     contacts = runs(touching)
     said = any(s.kind in ON_SUPPORT for s in recording.segments)
     known = {} if said or request.base else recognised(signals, boundary, contacts)

@@ -13,6 +13,7 @@ import pytest
 
 import palpate as pp
 from palpate.cli import main
+from palpate.operations._written import reconstruct_words
 
 from ..importing.test_meaning import press, write
 
@@ -171,3 +172,14 @@ def test_a_table_of_another_program_is_brought_in_by_the_commands_that_its_refus
     (bring, look) = re.findall(r"'palpate ([^']*)'", capsys.readouterr().err)
     assert main(shlex.split(f"{bring.replace('REC', 'r.csv.gz')} --tip-radius 0.005")) == 0
     assert main(["check", "r.csv.gz"]) == 0 and look == "open robot.csv"
+
+
+def test_a_corrected_recording_is_reconstructed_by_the_geometry_that_is_known():
+    """The next step named no shape, and ended in "no boundary phase found"."""
+    model = pp.load("demo")
+    assert reconstruct_words("CLEAN.csv.gz", model) == "palpate reconstruct CLEAN.csv.gz -o MODEL"
+    made = {
+        "options": {"geometry": {"shape": "my part.stl", "unit": "mm", "pose": "auto", "half_space": False}}
+    }
+    words = reconstruct_words("CLEAN.csv.gz", model.replaced(provenance=made))
+    assert words == "palpate reconstruct CLEAN.csv.gz --shape 'my part.stl' --unit mm -o MODEL"
