@@ -114,6 +114,10 @@ class NuisanceOptions:
     stick: float = option(
         Slip.diagnosis.value, "share by which the tangential force may be wrong, each press"
     )
+    leaning: float = option(
+        Slip.leaning.value,
+        "share by which the tangential force may be wrong in what exceeds the normal one, each sample",
+    )
     law: float = option(
         DepthLaw.diagnosis.value, "share by which a site's depth law may bend wrongly over the depth reached"
     )

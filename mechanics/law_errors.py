@@ -173,6 +173,11 @@ class Slip:
     """Share by which the force along the surface is wrong: how far the tip sticks."""
 
     diagnosis = OwnError(0.25, "1", "force along the surface, of itself", "press", _DIAGNOSIS)
+    leaning = OwnError(
+        0.5, "1", "force along the surface beyond the force along the normal, of a tip that sticks", "sample",
+        "a tip dragged 3.7 mm over a dome and drawn out, in the laboratory: at 0.5 mm of depth the law holds "
+        "1.35 N aside beside 0.3 N, where 0.36 N are solved",
+    )  # fmt: skip
     common = OwnError(
         0.15, "1", "force along the surface of all presses, of itself", "all places", _EXPLORING
     )
@@ -195,6 +200,12 @@ class Unnamed:
         0.01, "1", "force in proportion to itself", "sample",
         "the laboratory's blind cases: with 0.5 % a sound dome stays unknown, with 1 % not; of 25 controls "
         "2 in place of 4 are given a cause",
+    )  # fmt: skip
+    alike = OwnError(
+        0.002, "1", "force in proportion to itself, in any form that bends the law of all presses alike",
+        "all places",
+        "silicones of another simulator without a flaw hold 17 nats for a skin that changes 0.2 % of the "
+        "force, domes of the laboratory 19 for another flaw of 0.5 %: no law of ours is as exact",
     )  # fmt: skip
     along = OwnError(
         6.25, "1", "variance of that share in a sum along a press, over that of one anew at each sample",

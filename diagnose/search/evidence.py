@@ -112,7 +112,10 @@ class Search:
         t = self.forward.touches
         before, after = old.residual[t.counted], new.residual[t.counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
-        return Score(tuple(added), float(gain / over), size, float(foretold / over), per_group / over, new)
+        return Score(
+            tuple(added), float(gain / over), size, size / t.force_rms_n, float(foretold / over),
+            per_group / over, new,
+        )  # fmt: skip
 
     def able(self, score: Score, *, first: bool = True) -> bool:
         """Whether a score's effect may be there at all. first: nothing else is named yet."""

@@ -18,7 +18,7 @@ from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.gaps import beside_modulus_n
 from palpate.diagnosis.search.leave_one_out import JudgedSet
-from palpate.diagnosis.search.naming import WEIGHTS, beyond_untold
+from palpate.diagnosis.search.naming import WEIGHTS, most_told
 from palpate.diagnosis.search.rivals import of_one_phenomenon
 from palpate.mechanics.effects.base import Effect
 
@@ -83,7 +83,7 @@ class Patterns:
                     columns.append(change)
                     own.append(number)
                     size.append(rms)
-                    beyond.append(beyond_untold(effect, form))
+                    beyond.append(most_told(effect, form, rms / forward.touches.force_rms_n))
         self.own, self.size, self.beyond = np.array(own, dtype=int), np.array(size), np.array(beyond)
         shown = np.stack(columns, axis=2)
         if fitted:

@@ -20,6 +20,7 @@ from scipy.special import expit
 
 from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.law_errors import Unnamed
 
 
 @dataclass(frozen=True)
@@ -39,13 +40,16 @@ class Weights:
 ALL_TOLD = 1e12
 
 
-def beyond_untold(effect: Effect, values: np.ndarray) -> float:
-    """Log likelihood that an effect of these values (k,) has at most, as they may be so where nothing is
-    wrong; a very large number where all is told."""
-    if not effect.hints.untold:
-        return ALL_TOLD
-    beyond = (values - effect.ideal) / effect.hints.untold
-    return 0.5 * float(beyond @ beyond)
+def most_told(effect: Effect, values: np.ndarray, share: float) -> float:
+    """Log likelihood that an effect of these values (k,) has at most, as our own law may err so where nothing
+    is wrong; a very large number where all is told. share: of the force, rms, that it changes."""
+    most = ALL_TOLD
+    if effect.hints.untold:
+        beyond = (values - effect.ideal) / effect.hints.untold
+        most = 0.5 * float(beyond @ beyond)
+    if effect.hints.few_places:
+        return most  # what is wrong with single places is their own error's
+    return min(most, 0.5 * (share / Unnamed.alike.value) ** 2)
 
 
 FILE = Path(__file__).with_name("naming.toml")
@@ -58,7 +62,8 @@ class Score:
     """How much better a candidate is than what it was added to.
 
     added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
-    per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N.
+    per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N;
+    share: the same over the force.
     foretold: log likelihood gained at places that the fit has not seen, all in all; of a lump as fitted, 0
     where the plain squares do not shrink.
     """
@@ -66,6 +71,7 @@ class Score:
     added: tuple[Effect, ...]
     gain: float
     size_n: float
+    share: float
     foretold: float
     per_group: np.ndarray
     candidate: JudgedSet
@@ -84,11 +90,11 @@ class Score:
     def evidence(self) -> float:
         """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
         is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which. No
-        more than what the values are beyond what they may be where nothing is wrong."""
+        more than our own law's errors leave to be told."""
         if self.effect.hints.few_places:
             return self.gain - float(np.log(len(self.per_group)))
         told = self.gain - max(float(self.per_group.max()), 0.0)
-        return min(told, beyond_untold(self.effect, self.candidate.found.of(self.effect.name)))
+        return min(told, most_told(self.effect, self.candidate.found.of(self.effect.name), self.share))
 
     @property
     def by_one_place(self) -> bool:

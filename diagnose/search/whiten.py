@@ -78,6 +78,8 @@ class Whitener:
         self.variance = slow * self.touches.noise_n**2 + options.floor_n**2
         before = np.nan_to_num(forward.predict(settings))
         unnamed = (options.floor_share * np.linalg.norm(before, axis=1)) ** 2
+        aside = np.linalg.norm(before[:, 1:], axis=1) - np.abs(before[:, 0])
+        unnamed += (options.leaning * np.maximum(aside, 0.0)) ** 2
         bridges, self.air, unbridged = _bridges(self.touches)
         self.louder = np.sqrt(1 + (options.floor_along * unnamed + unbridged) / self.variance)
         self.sample_variance = self.touches.noise_n**2 + options.floor_n**2 + unnamed + unbridged

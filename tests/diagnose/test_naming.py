@@ -14,10 +14,10 @@ from palpate.diagnosis.search.rivals import Choice
 from palpate.mechanics.effects.registry import effect
 
 
-def score(name, per_group, foretold=9.0, values=(0.02,)):
+def score(name, per_group, foretold=9.0, values=(0.02,), share=0.02):
     gains = np.asarray(per_group, float)
     return Score(
-        (effect(name),), gain=gains.sum(), size_n=0.014, foretold=foretold, per_group=gains,
+        (effect(name),), gain=gains.sum(), size_n=0.014, share=share, foretold=foretold, per_group=gains,
         candidate=SimpleNamespace(chi=0.85, found=SimpleNamespace(of=lambda name: np.array(values))),
     )  # fmt: skip
 
@@ -51,6 +51,21 @@ def test_what_is_there_is_named_unless_places_that_it_has_not_seen_grow_unlikeli
 def test_a_clock_that_reads_half_a_sample_late_is_no_delay(search, delay_s, named):
     """However surely many touches tell it: it may be so where nothing is wrong."""
     assert search.passes(score("time_delay", [12.0, 8.0, 20.0, 16.0] * 10, values=(delay_s,))) == named
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "named"),
+    [
+        ("skin_layer", 0.002, False),
+        ("skin_layer", 0.02, True),
+        ("inclusion", 0.002, True),
+    ],
+)
+def test_what_changes_a_few_thousandths_of_the_force_is_within_our_own_law(name, share, named):
+    """Silicones without a flaw held 17 nats for a skin that changed 0.2 % of the force."""
+    search = Search.__new__(Search)
+    search.options = AttributionOptions()
+    assert search.passes(score(name, [12.0, 8.0, 20.0, 16.0] * 10, share=share)) == named
 
 
 def test_a_closed_gap_without_evidence_names_nothing(search):

@@ -172,7 +172,7 @@ def test_the_band_is_what_a_press_there_may_be_off_by(renderer):
     figures = error_figures(force_errors(known, centre[None], np.array([[0.0, 0.0, 1.0]]), radius))
     off = np.hypot(figures["force_error_n"], figures["modulus_error_n"])
     assert force_band(known, np.array([depth]))[row, 0] == pytest.approx(off, rel=1e-6)
-    assert f"{1e3 * off:.3g} mN for the law and the modulus" in said(figures)
+    assert f"{1e3 * off:.3g} mN for the law and the modulus" in said(figures, from_touch=True)
 
 
 def test_the_file_is_one_page_that_fetches_nothing(written):
