@@ -49,7 +49,7 @@ WORDS = {
     SLEWED: "limited in its rise",
     FADED: "fading at the workspace's edge",
     PASSIVITY: "damped to stay passive",
-    SILENT: "the program that shows it is silent",
+    SILENT: "the program beside the loop does not answer in time",
 }
 
 

@@ -183,6 +183,6 @@ def _why(plan: Plan, first: str, second: str, size: float, sigmas: float) -> str
     held = f", held {plan.hold:.1f} s" if plan.hold > 1 else ""
     return (
         f"of all presses compared, a {pace}, {depth} one{extra}{held} at this place parts "
-        f"{parted((first, second))} most: typically {size * 1e3:.0f} mN, "
+        f"{parted((first, second))} most: typically by {size * 1e3:.0f} mN, over the whole press "
         f"{sigmas:.0f} times what noise and our own errors would do"
     )

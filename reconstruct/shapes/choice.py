@@ -172,8 +172,9 @@ def reason(best: Explained, tried: list[Explained]) -> str:
     text = f"predicts touches at places left out within {error:.2f} mm"
     if others:
         second = max(others, key=score)
-        error = 1e3 * held_out_error(second)
-        text += f" (next likeliest: {second.name}, {error:.2f} mm)"
+        nearer = 1e3 * held_out_error(second)
+        but = ", but less likely all told" if nearer < error else ""
+        text += f" (next likeliest: {second.name}, {nearer:.2f} mm{but})"
     return text
 
 

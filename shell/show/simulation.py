@@ -28,7 +28,7 @@ def story(result: Simulation) -> say.Story:
     """What was simulated, and how large each effect is."""
     yield say.Title(f"Simulated exploration of {result.recording.object_name}")
     recording, truth = result.recording, result.truth
-    seconds, count = f"{recording.t[-1]:.0f} s", f"{len(result.touches)} touches"
+    seconds, count = f"{recording.t[-1]:.0f} s of readings", f"{len(result.touches)} touches"
     yield say.Headline(
         f"Simulation {recording.name}: {seconds}, {count} of the {result.phantom}", on=say.TEXT
     )

@@ -74,9 +74,7 @@ def story(result: Diagnosis) -> say.Story:
     if not result.effects and (said := limits(result)):
         yield say.TextLine(said)
     if result.left_out:
-        yield say.TextLine(
-            f"not tried (these presses cannot show it, or --fast leaves it out): {spoken(result.left_out)}"
-        )
+        yield say.TextLine(f"not tried: {untried(result)}")
     yield say.Headline(verdict(result), on=say.PAGE)
     yield say.Section("", _means(result))
     yield say.Next(next_steps(result))
@@ -138,6 +136,9 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
     no_model_holds = [name for name in asked if name not in (*instrument, *kept)]
     if model.path is not None:
         recording += f" --model {file_words(model.path, 'MODEL')}"
+    if result.next_touch is not None and result.unsettled:
+        told = parted(result.next_touch.separates)
+        yield f"make the next touch that is described here: it is to tell {told}"
     if kept:
         yield (
             f"put {spoken(kept)} into the model, and feel it: `palpate diagnose {recording} --apply BETTER`, "
@@ -152,9 +153,6 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
         yield f"explore again, and reconstruct: no model holds {spoken(no_model_holds)}"
     if not asked:
         yield feel_step(model.path, f"palpate reconstruct {recording} -o MODEL")
-    if result.next_touch is not None and result.unsettled:
-        told = parted(result.next_touch.separates)
-        yield f"make the next touch that is described here: it is to tell {told}"
 
 
 def _caption(result: Diagnosis) -> str:
@@ -241,12 +239,23 @@ def _tried(result: Diagnosis) -> say.Story:
             for e in result.entries[:MOST_EFFECTS]
         ],
     )
+    if rest := [e.name for e in result.entries[MOST_EFFECTS:]]:
+        yield say.Sentence(f"Tried too, and less likely: {spoken(rest)}.")
     if result.confusable:
         pairs = (spoken((a, b)) for a, b, _ in result.confusable[:6])
         yield say.Sentence(f"With these touches the following look alike: {'; '.join(pairs)}")
     if result.left_out:
-        words = "Not tried, as such touches cannot show it or the fast setting leaves it out"
-        yield say.Sentence(f"{words}: {spoken(result.left_out)}")
+        yield say.Sentence(f"Not tried: {untried(result)}")
+
+
+def untried(result: Diagnosis) -> str:
+    """What was left out, and why: what takes long is tried without the quick setting, where it can show."""
+    long = [name for name in result.left_out if effect(name).hints.expensive]
+    unseen = [name for name in result.left_out if name not in long]
+    said = [f"{spoken(unseen)} (these touches cannot show it)"] if unseen else []
+    if long:
+        said.append(f"{spoken(long)} (the quick setting leaves it out, or these touches cannot show it)")
+    return "; ".join(said)
 
 
 def _from(limit_n: float) -> str:
