@@ -198,8 +198,8 @@ class Unnamed:
 
     share = OwnError(
         0.005, "1", "force in proportion to itself", "sample",
-        "of 8 sound objects of the laboratory (elements of 1.5 mm) and 3 of another simulator none has a lack "
-        "of fit above 0.95 by it (0.41 to 0.6 with 1 %), and none is given a cause",
+        "of 10 sound objects of the laboratory (elements of 1.5 mm) and 3 of another simulator none has a "
+        "lack of fit above 0.95 by it, and none is given a cause",
     )  # fmt: skip
     alike = OwnError(
         0.002, "1", "force in proportion to itself, in any form that bends the law of all presses alike",

@@ -270,6 +270,17 @@ class Presses:
         return float(np.sqrt((self.local_force[self.counted] ** 2).sum(axis=1).mean()))
 
     @property
+    def lost_work(self) -> float:
+        """Share of the work of pressing in, along the normal, that does not come back; median of presses."""
+        lost = []
+        for part in self.parts:
+            force, depth = self.local_force[part, 0], self.travel[part, 0]
+            work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(depth))])
+            if (spent := work[np.argmax(depth)]) > 0:
+                lost.append(work[-1] / spent)
+        return float(np.median(lost)) if lost else 0.0
+
+    @property
     def thinned_away(self) -> float:
         """N^2, what thinning took off the mean square of the 3-vector."""
         return 3 * (self.noise.raw_n**2 - self.noise_n**2)

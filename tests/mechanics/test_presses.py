@@ -60,6 +60,15 @@ def test_a_table_knows_touch_depth_site_and_noise():
     assert not presses.t.flags.writeable
 
 
+def test_work_that_does_not_come_back_is_a_share_of_what_was_spent():
+    """A log of a material that creeps gave 28 kPa (26.5 to 29.4), and 22 with its creep: nothing said so."""
+    made = recording(noise=0.05)
+    assert table(made).lost_work == pytest.approx(0.0, abs=0.01)
+    back = np.arange(len(made.t)) % round(2.0 * RATE) >= round(1.5 * RATE)
+    softer = made.force_on_tool * np.where(back, 0.7, 1.0)[:, None]
+    assert table(dataclasses.replace(made, force_on_tool=softer)).lost_work == pytest.approx(0.3, abs=0.02)
+
+
 def test_what_a_swung_tool_reads_is_no_noise():
     """80 g at 2 m/s^2 and 5 mN: with what it reads in the air taken off, the noise is the sensor's."""
     made = recording(noise=0.005)

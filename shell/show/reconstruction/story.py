@@ -326,6 +326,10 @@ def mending(result: Reconstruction) -> list[Way]:
     return ways
 
 
+_LOST = 0.05
+"""Share of a press's work that does not come back, from which it is said: elastic recordings lose 0.2 %."""
+
+
 def meaning(result: Reconstruction) -> str:
     """What the modulus and its interval mean, in a sentence or two."""
     model = result.model
@@ -337,6 +341,11 @@ def meaning(result: Reconstruction) -> str:
             f"{100 * max(high / e - 1, 1 - low / e):.0f} % of this one."
         )
     shown = _shown(result)
+    if (lost := shown.net.lost_work) > _LOST:
+        words += (
+            f" Of a press's work {100 * lost:.0f} % does not come back, so it holds for presses as fast as these: "
+            "`palpate diagnose` tells what of it lasts."
+        )
     force = _with_one_modulus(result, shown)
     if force is not None:
         misfit = float(np.sqrt((rms_by_press(shown, force - shown.force) ** 2).mean()))
