@@ -343,8 +343,8 @@ def meaning(result: Reconstruction) -> str:
     shown = _shown(result)
     if (lost := shown.net.lost_work) > _LOST:
         words += (
-            f" Of a press's work {100 * lost:.0f} % does not come back, so it holds for presses as fast as these: "
-            "`palpate diagnose` tells what of it lasts."
+            f" Of a press's work {100 * lost:.0f} % does not come back, so it holds for presses as fast as "
+            "these: `palpate diagnose` tells what of it lasts."
         )
     force = _with_one_modulus(result, shown)
     if force is not None:
