@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from palpate import cli, demo, warm_up
@@ -44,6 +45,17 @@ def test_stages_that_are_compiled_are_left_alone(tmp_path: Path, monkeypatch: py
             compiling()
     first, second = warm_up.BESIDE_ONE_ANOTHER
     assert Started.all == [first, second, second]
+
+
+def test_what_is_compiled_on_is_pressed_and_has_few_places() -> None:
+    """Each place costs solves on a fine mesh: with 1,313 a process computed for longer than it compiled."""
+    block = warm_up.block_renderer()
+    state = block.start()
+    for depth in (-1e-3, 1e-3):
+        tip = np.array([[0.0, 0.0, warm_up._SIZE_M + warm_up._TIP_RADIUS_M - depth]])
+        force = block.step(state, tip)[1]
+    assert force[0, 2] > 0.01
+    assert len(block.compliance.own) < 300
 
 
 def test_the_demo_says_that_its_object_can_be_touched_meanwhile(
