@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from palpate import cli, demo, warm_up
+from palpate.mechanics.compliance.sites import touch_solver
 from palpate.mechanics.errors import ContactError
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.operations.demo import MEANWHILE
 
 
@@ -69,6 +71,29 @@ def test_the_demo_says_that_its_object_can_be_touched_meanwhile(
         monkeypatch.setattr(sys.stderr, "isatty", lambda there=terminal: there)
         assert cli.main(["demo", "-o", str(tmp_path / "demo")]) == 2
         assert (MEANWHILE in capsys.readouterr().err) == terminal
+
+
+def test_the_demo_factorises_its_object_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reconstruction, compliance and diagnosis are of one mesh: each factorised it anew."""
+    mesh = box_mesh((2, 2, 2), (0.02,) * 3)
+    used: list[object] = []
+    model = SimpleNamespace(model=None)
+
+    def solves(*_: object, **__: object) -> SimpleNamespace:
+        used.append(touch_solver(mesh, 0.45))
+        return model
+
+    for name in ("reconstruct", "renderer", "diagnose"):
+        monkeypatch.setattr(demo, name, solves)
+    monkeypatch.setattr(demo, "warming_up", lambda: nullcontext(lambda: None))
+    monkeypatch.setattr(demo, "read_recording", lambda *_: None)
+    monkeypatch.setattr(
+        demo, "replay", lambda *_, **__: SimpleNamespace(force_n=None, rmse_n=0.0, force_rms_n=1.0)
+    )
+    monkeypatch.setattr(demo, "run_headless", lambda *_, **__: None)
+    demo.run_demo("REC", tmp_path, demo.DemoOptions())
+    assert len(used) == 3
+    assert all(each is used[0] for each in used)
 
 
 def test_the_demo_waits_for_kernels_only_where_it_feels(
