@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.mechanics.compliance.sites import factorised_once
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.options import option
 from palpate.mechanics.progress import Progress
@@ -80,7 +81,7 @@ def run_demo(source: Path | str, folder: Path, options: DemoOptions, seed: int =
 
     recording = read_recording(source)
     diagnosis = None
-    with warming_up() as compiling:
+    with warming_up() as compiling, factorised_once():  # one mesh is solved on by three stages
         with stage("reconstruct") as progress:
             done = reconstruct(recording, save=folder / "model", seed=seed, progress=progress)
             model = done.model

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -64,8 +65,11 @@ def block_renderer(name: str = "fem") -> Any:
     from palpate.mechanics.presses.table import FITS
     from palpate.mechanics.shape.tetmesh import box_mesh
 
-    mesh = box_mesh((2, 2, 2), (_SIZE_M,) * 3).quadratic()
     up = np.array([0.0, 0.0, 1.0])
+    mesh = box_mesh((2, 2, 2), (_SIZE_M,) * 3)
+    # held all round the middle of its top: each place that can be touched costs solves on a fine mesh
+    middle = np.linalg.norm(mesh.points - _SIZE_M * up, axis=1) < 0.1 * _SIZE_M
+    mesh = replace(mesh, fixed=~middle, touchable=middle).quadratic()
     block = Model(
         mesh, ObjectMaterial(20e3, 0.49), Support(np.zeros(3), up), Tool(_TIP_RADIUS_M), _SIZE_M / 2
     )

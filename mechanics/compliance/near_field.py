@@ -118,13 +118,13 @@ def depth_law(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(compliance (k,) 1/m, bend (k,)) by which a touch has the forces at BALL_DEPTHS that compliances (k,)
     of those depths alone would give it."""
-    table = np.array(dent_law("linear", poisson_ratio).table)
+    columns = dent_law("linear", poisson_ratio).table.T
+    at, c_at, g_at = grid(), *np.ascontiguousarray(columns[[0, 3]])  # else copied at every step of a root
     unit = tip_radius_m / (softness * (1 - poisson_ratio**2))  # of forces over the radius, unit modulus
 
     def dent(x: np.ndarray, bend: np.ndarray | float = 0.0) -> np.ndarray:
         """Its force over the radius, x in radii."""
-        c, g = (np.interp(x, grid(), table[:, column]) for column in (0, 3))
-        return unit * c * (1 + bend * g) * x**1.5
+        return unit * np.interp(x, at, c_at) * (1 + bend * np.interp(x, at, g_at)) * x**1.5
 
     def force(change: np.ndarray, depth: float) -> np.ndarray:
         def beyond(x: np.ndarray) -> np.ndarray:
@@ -134,9 +134,9 @@ def depth_law(
 
     forces = [force(change, depth) for change, depth in zip((shallow, deep), BALL_DEPTHS, strict=True)]
 
-    def bent(at: int, compliance: np.ndarray) -> np.ndarray:
-        x = np.maximum(BALL_DEPTHS[at] - compliance * forces[at], 0.05)
-        return (forces[at] / dent(x) - 1) / np.interp(x, grid(), table[:, 3])
+    def bent(i: int, compliance: np.ndarray) -> np.ndarray:
+        x = np.maximum(BALL_DEPTHS[i] - compliance * forces[i], 0.05)
+        return (forces[i] / dent(x) - 1) / np.interp(x, at, g_at)
 
     # beyond the shallow one by so many times their difference, the same bend serves both
     sign = np.sign(shallow - deep)

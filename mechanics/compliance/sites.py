@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -14,6 +16,7 @@ from palpate.mechanics.compliance.patch import half_space_compliance, usual_widt
 from palpate.mechanics.contact.dent import ellipse_curvature
 from palpate.mechanics.contact.depth_factors import DepthFactors
 from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import MeshError
@@ -110,15 +113,45 @@ def touch_solver(
     to 5 % too soft. Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
     `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out.
     """
-    surface_edge_m = surface_edge_m or surface_edge(mesh)
-    fine, parent = refined_near_surface(mesh, surface_edge_m)
+    edge_m, corners = surface_edge_m or surface_edge(mesh), mesh.linear()
+    ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
+    if ratio is not None and (ratio == 1).all():
+        ratio = None
+    made = _made.get()
+    key = content_key(
+        corners.points, corners.tetrahedra, corners.fixed, corners.touchable,
+        "" if mesh.shape is None else mesh.shape.key,
+        poisson_ratio, ratio, edge_m, *map(astuple, balls), *(() if hold is None else astuple(hold)),
+    )  # fmt: skip
+    if made is not None and key in made:
+        return made[key]
+    fine, parent = refined_near_surface(corners, edge_m)
     for ball in balls:
-        fine, step = refined_around(fine, np.array(ball.centre_m), ball.radius_m, surface_edge_m)
+        fine, step = refined_around(fine, np.array(ball.centre_m), ball.radius_m, edge_m)
         parent = parent[step]
-    ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)[parent]
+    if ratio is not None:
+        ratio = ratio[parent]
     if balls:
         ratio = with_balls(fine, ratio, balls)
-    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold)
+    solver = Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold)
+    if made is not None:
+        made.clear()
+        made[key] = solver
+    return solver
+
+
+@contextmanager
+def factorised_once() -> Iterator[None]:
+    """Within it `touch_solver` gives this thread its last one again where it would make the same anew: for
+    who asks an object one thing after another. It holds that one's memory, some 300 MB, to its end."""
+    token = _made.set({})
+    try:
+        yield
+    finally:
+        _made.reset(token)
+
+
+_made: ContextVar[dict[str, Solver] | None] = ContextVar("made", default=None)
 
 
 def surface_edge(mesh: TetMesh) -> float:

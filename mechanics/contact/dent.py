@@ -150,9 +150,12 @@ def dent_laws() -> tuple[str, ...]:
     return tuple(_LAWS)
 
 
+@lru_cache(maxsize=1)
 def grid() -> np.ndarray:
-    """The indentations in tip radii at which every table is given."""
-    return np.linspace(0.0, DEPTH_LIMIT, _STEPS + 1)
+    """(n,), read only: the indentations in tip radii at which every table is given."""
+    made = np.linspace(0.0, DEPTH_LIMIT, _STEPS + 1)
+    made.setflags(write=False)
+    return made
 
 
 def _hertz() -> tuple[np.ndarray, str]:

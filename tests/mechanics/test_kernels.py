@@ -5,8 +5,11 @@ import re
 from pathlib import Path
 
 import pytest
+from numba import njit
+from numba.core.codegen import JitEngine
 
 from palpate.mechanics.kernel_cache import sources
+from palpate.mechanics.kernels import fresh_part
 
 ROOT = Path(__file__).resolve().parents[2]
 ALONE = {"part", "inner", "fresh_part"}
@@ -42,6 +45,25 @@ def texts() -> dict[str, str]:
 def those_with(texts: dict[str, str], pattern: str) -> dict[str, ast.Module]:
     """Of the sources those in which this is found, parsed."""
     return {module: ast.parse(text) for module, text in texts.items() if re.search(pattern, text)}
+
+
+def test_what_only_kernels_call_is_made_for_the_processor_within_them_alone(monkeypatch):
+    """For itself as well it is made, and optimised, for nobody."""
+    made = []
+    finish = JitEngine.finalize_object
+    monkeypatch.setattr(JitEngine, "finalize_object", lambda self: (made.append(1), finish(self)))
+
+    def half(x):
+        return 0.5 * x
+
+    counts = []
+    for decorate in (njit, fresh_part, njit):  # the first compiles what adds numbers, too
+        callee = decorate(half)
+        before = len(made)
+        assert njit(lambda x, callee=callee: callee(x) + callee(x + 1.0))(4.0) == 4.5
+        counts.append(len(made) - before)
+    _, within, beside = counts
+    assert within == beside - 1
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from palpate.mechanics.errors import FileError, PalpateWarning, SceneError
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.fem.renderer import FemRenderer
 from palpate.scenes import build, shipped
 from palpate.scenes.scene import Scene, load_scene
@@ -28,7 +29,7 @@ MOST_BYTES = 15_000_000
 def packed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Path]:
     """A block's model with its compliance, and its archive."""
     folder = tmp_path_factory.mktemp("packed")
-    block = block_renderer().model
+    block = block_renderer().model.replaced(mesh=box_mesh((2, 2, 2), (0.012,) * 3).quadratic())
     model = block.replaced(path=write_model(folder / "block", block))
     archive = folder / "block-0123.zip"
     shipped.pack(model.path, archive, load_or_condense(model), compliance_key(model))

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from palpate import cli, demo, warm_up
+from palpate.mechanics.compliance.sites import touch_solver
 from palpate.mechanics.errors import ContactError
+from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.operations.demo import MEANWHILE
 
 
@@ -46,6 +49,17 @@ def test_stages_that_are_compiled_are_left_alone(tmp_path: Path, monkeypatch: py
     assert Started.all == [first, second, second]
 
 
+def test_what_is_compiled_on_is_pressed_and_has_few_places() -> None:
+    """Each place costs solves on a fine mesh: with 1,313 a process computed for longer than it compiled."""
+    block = warm_up.block_renderer()
+    state = block.start()
+    for depth in (-1e-3, 1e-3):
+        tip = np.array([[0.0, 0.0, warm_up._SIZE_M + warm_up._TIP_RADIUS_M - depth]])
+        force = block.step(state, tip)[1]
+    assert force[0, 2] > 0.01
+    assert len(block.compliance.own) < 300
+
+
 def test_the_demo_says_that_its_object_can_be_touched_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -57,6 +71,29 @@ def test_the_demo_says_that_its_object_can_be_touched_meanwhile(
         monkeypatch.setattr(sys.stderr, "isatty", lambda there=terminal: there)
         assert cli.main(["demo", "-o", str(tmp_path / "demo")]) == 2
         assert (MEANWHILE in capsys.readouterr().err) == terminal
+
+
+def test_the_demo_factorises_its_object_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reconstruction, compliance and diagnosis are of one mesh: each factorised it anew."""
+    mesh = box_mesh((2, 2, 2), (0.02,) * 3)
+    used: list[object] = []
+    model = SimpleNamespace(model=None)
+
+    def solves(*_: object, **__: object) -> SimpleNamespace:
+        used.append(touch_solver(mesh, 0.45))
+        return model
+
+    for name in ("reconstruct", "renderer", "diagnose"):
+        monkeypatch.setattr(demo, name, solves)
+    monkeypatch.setattr(demo, "warming_up", lambda: nullcontext(lambda: None))
+    monkeypatch.setattr(demo, "read_recording", lambda *_: None)
+    monkeypatch.setattr(
+        demo, "replay", lambda *_, **__: SimpleNamespace(force_n=None, rmse_n=0.0, force_rms_n=1.0)
+    )
+    monkeypatch.setattr(demo, "run_headless", lambda *_, **__: None)
+    demo.run_demo("REC", tmp_path, demo.DemoOptions())
+    assert len(used) == 3
+    assert all(each is used[0] for each in used)
 
 
 def test_the_demo_waits_for_kernels_only_where_it_feels(
