@@ -130,7 +130,8 @@ def compare(models: list[Model], count: int, solved: int) -> dict[str, Any]:
     places = places_of(models[0], count)
     renderers = [renderer_of(model, places.tip_m) for model in models]
     forces = np.full((len(models), len(places.points)), np.nan)
-    bound, said, hertz, exact, unsettled = [], [], [], [], 0
+    bound = np.full(len(places.points), np.nan)
+    said, hertz, exact, unsettled = [], [], [], 0
     for k in range(len(places.points)):
         for m, renderer in enumerate(renderers):
             curve, words = pressed(renderer, places, k)
@@ -140,7 +141,7 @@ def compare(models: list[Model], count: int, solved: int) -> dict[str, Any]:
             unsettled += curve.unsettled
             forces[m, k] = float(np.linalg.norm(curve.force[curve.deepest]))
             if m == 0:
-                bound.append(curve.error_figures["force_error_n"] / max(forces[m, k], 1e-12))
+                bound[k] = curve.error_figures["force_error_n"] / max(forces[m, k], 1e-12)
         if places.hertz[k]:
             curve, words = pressed(renderers[0], places, k, hertz=True)
             if curve is not None:
@@ -157,7 +158,8 @@ def compare(models: list[Model], count: int, solved: int) -> dict[str, Any]:
     return {
         "places": len(places.points), "pressed": int(np.isfinite(forces[0]).sum()), "said": sorted(set(said)),
         "least_force_n": float(np.nanmin(forces)) if np.isfinite(forces).any() else None,
-        "unsettled": unsettled, "between_sizes": sizes.ravel().tolist(), "stated_share": bound,
+        "unsettled": unsettled, "between_sizes": sizes.ravel().tolist(),
+        "stated_share": bound[pressed_both].tolist(),
         "over_hertz": hertz, "over_solver": exact, "tip_mm": 1e3 * places.tip_m,
         "depth_mm": (1e3 * places.depth_m).tolist(),
     }  # fmt: skip

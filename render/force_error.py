@@ -82,7 +82,8 @@ def force_errors(
     sd = uncertain[near] if len(uncertain) == len(surface.vertices) else np.zeros(len(size))
     measured = len(renderer.model.presses) and not is_given(renderer.model)
     onset = ONSET_NOISE_M if measured else 0.0
-    law = np.hypot(shares * size, _on_rims(renderer, position, size, numbers[2], tip_radius_m))
+    far = renderer.far_at(vertices)[row.ravel()]
+    law = np.hypot(shares * size, _on_rims(renderer, position, size, numbers[2], far, tip_radius_m))
     return ForceErrors(
         law,
         modulus_share(renderer.model) * size,
@@ -98,16 +99,23 @@ def modulus_share(model: Model) -> float:
 
 
 def _on_rims(
-    renderer: FemRenderer, position: np.ndarray, size: np.ndarray, rim: np.ndarray, tip_radius_m: float
+    renderer: FemRenderer,
+    position: np.ndarray,
+    size: np.ndarray,
+    rim: np.ndarray,
+    far: np.ndarray,
+    tip_radius_m: float,
 ) -> np.ndarray:
-    """(n,) N by which forces size (n,) N may be off on and beside sharp rims, how near they are (n,).
+    """(n,) N by which forces size (n,) N may be off on and beside sharp rims, how near they are (n,); far:
+    (n, 3, 3) 1/m.
 
     The contact normal turns within a strip (render.surface.shaped), so a tip beside a rim is felt when it
-    overlaps the object already, and one on it is felt as on plane ground.
+    overlaps the object already, and one on it is felt as on plane ground. What is felt too late is no more
+    than the object's own stiffness makes of that way.
     """
     surface, material = renderer.contact.arrays, renderer.model.material
     beside = np.flatnonzero(rim > _BESIDE_RIM)
-    near, felt, turned = np.zeros((3, len(beside)))
+    near, felt, turned, give = np.zeros((4, len(beside)))
     weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
     point, normal, move = np.zeros((3, 3))
     for k, tip in enumerate(position[beside]):
@@ -116,6 +124,8 @@ def _on_rims(
         )
         if triangle >= 0 and surface.free[triangle]:
             near[k] = tip_radius_m - distance
+            away = (tip - weights @ surface.vertices[surface.triangles[triangle]]) / distance
+            give[k] = away @ far[beside[k]] @ away
             triangle, height = foot(surface, triangle, weights, tip, point, normal, move)
             felt[k] = tip_radius_m - height
             facing = facings(surface.vertices, surface.triangles[triangle][None])[0][0]
@@ -124,6 +134,8 @@ def _on_rims(
     given = (material.young_modulus_pa, material.poisson_ratio, tip_radius_m)
     hertz = dent_law("hertz")
     late = Bound.late.value * (hertz.force(near, *given) - hertz.force(felt, *given))
+    most = material.young_modulus_pa * (near - felt) / np.maximum(give, 1e-12)
+    late = np.minimum(late, np.where(give > 0, most, np.inf))
     edge = Bound.edge.value * turned * np.exp(-felt / (Bound.dented.value * tip_radius_m))
     off = np.zeros(len(size))
     off[beside] = np.hypot(late, edge * size[beside])

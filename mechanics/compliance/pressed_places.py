@@ -16,7 +16,7 @@ from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 
-VERSION = 11
+VERSION = 12
 UNIFORM = "uniform solver"
 """Stage: the factorisation that the places were solved by, of the object of one modulus."""
 BENT_BY = ("curvature", "bracing", "braced")

@@ -45,7 +45,7 @@ def compliance_key(model: Model, *, dense: bool = False) -> str:
     balls = tuple(material.inclusions.values())
     error = None if dense else low_rank_error(model.mesh)
     return content_key(
-        "surface compliance 9",
+        "surface compliance 10",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,

@@ -178,7 +178,7 @@ def _shape_key(model: Model) -> str:
 
 def _material_key(model: Model) -> str:
     return content_key(
-        "own stiffness 3",
+        "own stiffness 4",
         OWN_DEPTH_M,
         float(model.material.young_modulus_pa),
         float(model.material.poisson_ratio),

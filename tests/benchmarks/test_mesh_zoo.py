@@ -9,7 +9,7 @@ import pytest
 import palpate as pp
 from benchmarks import mesh_zoo
 from benchmarks._zoo_presses import places_of
-from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, run, tried
+from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, _judge, run, tried
 
 TEN = (
     "prostate",
@@ -60,6 +60,13 @@ def test_a_mesh_is_held_against_a_finer_one_or_none(most, sizes, tmp_path, monke
     monkeypatch.setattr(mesh_zoo, "_MOST", most)
     made = tried(ZOO["two blocks touching"](), tmp_path, places=0)["sizes_mm"]
     assert len(made) == sizes and made[-1] <= made[0]
+
+
+def test_sizes_that_differ_are_wrong_and_it_is_said_what_was_stated_there():
+    found = {"outcome": "right", "wrong": [], "volume_ratio": 1.0, "places": 2, "pressed": 2, "unsettled": 0}
+    found |= {"least_force_n": 1.0, "between_sizes": [0.01, -0.03], "stated_share": [0.02, 0.04]}
+    _judge(found | {"over_hertz": [], "over_solver": []})
+    assert found["wrong"] == ["sizes -0.030 of 0.040 stated"]
 
 
 def test_there_are_sixty():
