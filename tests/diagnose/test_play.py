@@ -115,8 +115,8 @@ def test_what_a_play_leaves_open_counts_less(bench):
     search = search_on(bench, lambda t, x, f: (followed(x), f))
     forward, fit = search.forward, search.judge([]).found
     own = settings_of(forward, [effect("backlash")], np.array([fit.values[0], -WIDTH]), fit.onset)
-    with_play = Whitener(forward, own, NuisanceOptions())
-    without = Whitener(forward, settings_of(forward, [], fit.values, fit.onset), NuisanceOptions())
+    with_play = Whitener(forward, own, NuisanceOptions(leaning=0.0))
+    without = Whitener(forward, settings_of(forward, [], fit.values, fit.onset), NuisanceOptions(leaning=0.0))
     still = forward.unsure.mean(axis=1) > 0.4
     assert (with_play.louder >= without.louder * 0.9).all()
     assert with_play.louder[still].mean() > 1.5 * without.louder[still].mean()

@@ -682,7 +682,7 @@ def test_every_effect_has_words_for_all_the_keys_that_an_answer_can_carry_of_it(
     assert said["time_delay"].startswith("force reads early by") and said["time_step"].startswith("late by")
     assert said["mesh_stiffness"] == "0.82 times as stiff as it should be"
     assert "times the object's modulus" in said["stiffness_field"]
-    assert said["stated_friction"] == "given none: it sticks, measured none: it sticks"
+    assert said["stated_friction"] == "given unlimited: the tip sticks, measured unlimited: the tip sticks"
 
 
 def test_a_share_below_0_is_said_in_a_sentence():
