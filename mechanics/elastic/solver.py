@@ -89,7 +89,9 @@ class Solver:
         flat = right.transpose(1, 2, 0).reshape(r * c, f).T  # without a copy where it is in this order
         if self.backend == "pardiso":
             half = self._factor.half_solve(flat).reshape(f, r, c)
-            return np.einsum("fri,frj->rij", half, half, optimize=True)
+            if r == 1:  # one group alone is summed up in another order: its last bits would be others
+                half = np.repeat(half, 2, axis=1)
+            return np.einsum("fri,frj->rij", half, half, optimize=True)[:r]
         solution = self.solve_free(flat).reshape(f, r, c)
         result = np.einsum("fri,frj->rij", right, solution, optimize=True)
         return 0.5 * (result + result.transpose(0, 2, 1))

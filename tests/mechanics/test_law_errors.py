@@ -47,6 +47,7 @@ def test_options_default_to_the_table():
             "press_stiffness": Repeats.diagnosis,
             "tilt": Direction.diagnosis,
             "stick": Slip.diagnosis,
+            "leaning": Slip.leaning,
             "law": DepthLaw.diagnosis,
             "latency_s": Latency.diagnosis,
             "floor_share": Unnamed.share,

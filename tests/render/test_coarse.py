@@ -63,7 +63,8 @@ def test_its_force_is_within_what_it_states(coarse, whole):
         one, other = (press(r, [x, y, SIZE[2]], [0, 0, -1], Stroke(depth, 0.05)) for r in (coarse, whole))
         missed.append(np.linalg.norm(one.force - other.force, axis=1).max())
         felt.append(other.peak_force_n)
-    assert np.quantile(missed, 0.9) < error < 0.2 * np.median(felt)
+    # the narrower the patch of a place, the faster its own compliance falls off towards a rim
+    assert np.quantile(missed, 0.9) < error < 0.25 * np.median(felt)
     assert error > 1e-5
 
 
