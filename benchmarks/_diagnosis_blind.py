@@ -81,15 +81,14 @@ def solve(number: int, finite: bool, work: str, laboratory: int) -> dict[str, An
     """Solve every touch of an object without effects, linear or neo-Hookean, and keep them in the work
     folder.
     """
-    from benchmarks.varied.objects import FINEST_MM, specimen, thing
+    from benchmarks.varied.objects import FINENESS, specimen, thing
     from palpate.scenes.laboratory.curves import Solving
     from palpate.scenes.laboratory.paths import touch_forces
-    from palpate.scenes.laboratory.specimen import Fineness
 
     it = thing(number)
     touches = [touch for place in it.places for touch in place]
     solid = replace(specimen(it), finite=finite)
-    solving = Solving(workers=1, cache=_touches(Path(work)), fineness=Fineness(finest=FINEST_MM))
+    solving = Solving(workers=1, cache=_touches(Path(work)), fineness=FINENESS)
     touch_forces(it.phantom, solid, touches, solving)
     return {"touches": len(touches)}
 

@@ -159,7 +159,7 @@ def compare(models: list[Model], count: int, solved: int) -> dict[str, Any]:
         "places": len(places.points), "pressed": int(np.isfinite(forces[0]).sum()), "said": sorted(set(said)),
         "least_force_n": float(np.nanmin(forces)) if np.isfinite(forces).any() else None,
         "unsettled": unsettled, "between_sizes": sizes.ravel().tolist(),
-        "stated_share": bound[pressed_both].tolist(),
+        "stated_share": np.broadcast_to(bound[pressed_both], sizes.shape).ravel().tolist(),
         "over_hertz": hertz, "over_solver": exact, "tip_mm": 1e3 * places.tip_m,
         "depth_mm": (1e3 * places.depth_m).tolist(),
     }  # fmt: skip

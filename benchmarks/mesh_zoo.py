@@ -187,7 +187,7 @@ def _judge(found: dict[str, Any]) -> None:
             wrong.append("a force of 0")
         if found["unsettled"]:
             wrong.append(f"{found['unsettled']} ticks unsettled")
-        beside = zip(found["between_sizes"], found["stated_share"], strict=False)
+        beside = zip(found["between_sizes"], found["stated_share"], strict=True)
         wrong += [f"sizes {x:+.3f} of {b:.3f} stated" for x, b in beside if abs(x) > _SIZES]
         wrong += [f"Hertz {x - 1:+.3f}" for x in found["over_hertz"] if abs(x - 1) > _HERTZ]
         wrong += [f"solver {x:+.3f} of {b:.3f}" for x, b in found["over_solver"] if abs(x) > b]

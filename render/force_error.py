@@ -82,8 +82,7 @@ def force_errors(
     sd = uncertain[near] if len(uncertain) == len(surface.vertices) else np.zeros(len(size))
     measured = len(renderer.model.presses) and not is_given(renderer.model)
     onset = ONSET_NOISE_M if measured else 0.0
-    far = renderer.far_at(vertices)[row.ravel()]
-    law = np.hypot(shares * size, _on_rims(renderer, position, size, numbers[2], far, tip_radius_m))
+    law = np.hypot(shares * size, _on_rims(renderer, position, size, numbers[2], near, tip_radius_m))
     return ForceErrors(
         law,
         modulus_share(renderer.model) * size,
@@ -103,11 +102,11 @@ def _on_rims(
     position: np.ndarray,
     size: np.ndarray,
     rim: np.ndarray,
-    far: np.ndarray,
+    vertex: np.ndarray,
     tip_radius_m: float,
 ) -> np.ndarray:
-    """(n,) N by which forces size (n,) N may be off on and beside sharp rims, how near they are (n,); far:
-    (n, 3, 3) 1/m.
+    """(n,) N by which forces size (n,) N may be off on and beside sharp rims, how near they are (n,);
+    vertex: (n,) of the surface, nearest to each.
 
     The contact normal turns within a strip (render.surface.shaped), so a tip beside a rim is felt when it
     overlaps the object already, and one on it is felt as on plane ground. What is felt too late is no more
@@ -115,6 +114,10 @@ def _on_rims(
     """
     surface, material = renderer.contact.arrays, renderer.model.material
     beside = np.flatnonzero(rim > _BESIDE_RIM)
+    off = np.zeros(len(size))
+    if not len(beside):
+        return off
+    far = renderer.far_at(vertex[beside])
     near, felt, turned, give = np.zeros((4, len(beside)))
     weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
     point, normal, move = np.zeros((3, 3))
@@ -125,7 +128,7 @@ def _on_rims(
         if triangle >= 0 and surface.free[triangle]:
             near[k] = tip_radius_m - distance
             away = (tip - weights @ surface.vertices[surface.triangles[triangle]]) / distance
-            give[k] = away @ far[beside[k]] @ away
+            give[k] = away @ far[k] @ away
             triangle, height = foot(surface, triangle, weights, tip, point, normal, move)
             felt[k] = tip_radius_m - height
             facing = facings(surface.vertices, surface.triangles[triangle][None])[0][0]
@@ -137,7 +140,6 @@ def _on_rims(
     most = material.young_modulus_pa * (near - felt) / np.maximum(give, 1e-12)
     late = np.minimum(late, np.where(give > 0, most, np.inf))
     edge = Bound.edge.value * turned * np.exp(-felt / (Bound.dented.value * tip_radius_m))
-    off = np.zeros(len(size))
     off[beside] = np.hypot(late, edge * size[beside])
     return off
 

@@ -33,9 +33,9 @@ DEEPEST_MM, THICKNESS = 10.0, 0.22
 DRAG_MM = 5.0
 """Deepest drag."""
 
-FINEST_MM = 1.5
-"""Longest edge of the laboratory's elements next to a touch: at 3 mm the force on a block bends by 2.4 % from
-0.5 to 6 mm of depth, which looks like a skin; at 2 mm by 0.9 %, at 1.5 mm by 0.5 % (beside 1 mm)."""
+FINENESS = Fineness(finest=1.5)
+"""Of the laboratory's elements next to a touch, edges of 1.5 mm: at 3 mm the force on a block bends by 2.4 %
+from 0.5 to 6 mm of depth, which looks like a skin; at 2 mm by 0.9 %, at 1.5 mm by 0.5 % (beside 1 mm)."""
 
 OBLIQUE_EVERY, DRAG_EVERY = 3, 6
 """Every so many sites an oblique press, a drag may be made."""
@@ -101,8 +101,7 @@ def solve(number: int, progress: Progress = silent, workers: int | None = 1) -> 
     """Solve every touch of the `number`-th object, and keep them (the laboratory's cache)."""
     it = thing(number)
     touches = [touch for place in it.places for touch in place]
-    fineness = Fineness(finest=FINEST_MM)
-    solving = Solving(workers, progress=progress, fineness=fineness, label=it.phantom.name)
+    solving = Solving(workers, progress=progress, fineness=FINENESS, label=it.phantom.name)
     touch_forces(it.phantom, specimen(it), touches, solving)
 
 

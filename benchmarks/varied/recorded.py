@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.varied.draws import Draw
 from benchmarks.varied.instrument import logged, weighed
-from benchmarks.varied.objects import FINEST_MM, Thing, thing
+from benchmarks.varied.objects import FINENESS, Thing, thing
 from benchmarks.varied.writing import object_name, write
 from palpate.mechanics.recording.recording import Recording, read_recording
 from palpate.mechanics.recording.segments import TimeSegment
@@ -74,7 +74,7 @@ def explored(
         tip_radius_m=it.tip_radius_m,
         force_noise_std_n=draw.noise_n,
         position_resolution_m=draw.resolution_m,
-        finest_mm=FINEST_MM,
+        finest_mm=FINENESS.finest,
     )
     staging = Staging(
         hand(draw),

@@ -113,19 +113,33 @@ def touch_solver(
     to 5 % too soft. Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
     `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out.
     """
-    edge_m, corners = surface_edge_m or surface_edge(mesh), mesh.linear()
+    corners, edge_m = mesh.linear(), surface_edge_m or surface_edge(mesh)
     ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
     if ratio is not None and (ratio == 1).all():
         ratio = None
     made = _made.get()
+    if made is None:
+        return _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold)
     key = content_key(
         corners.points, corners.tetrahedra, corners.fixed, corners.touchable,
         "" if mesh.shape is None else mesh.shape.key,
         poisson_ratio, ratio, edge_m, *map(astuple, balls), *(() if hold is None else astuple(hold)),
     )  # fmt: skip
-    if made is not None and key in made:
-        return made[key]
-    fine, parent = refined_near_surface(corners, edge_m)
+    if key not in made:
+        made.clear()
+        made[key] = _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold)
+    return made[key]
+
+
+def _factorised(
+    mesh: TetMesh,
+    poisson_ratio: float,
+    ratio: np.ndarray | None,
+    edge_m: float,
+    balls: Sequence[Ball],
+    hold: BaseHold | None,
+) -> Solver:
+    fine, parent = refined_near_surface(mesh, edge_m)
     for ball in balls:
         fine, step = refined_around(fine, np.array(ball.centre_m), ball.radius_m, edge_m)
         parent = parent[step]
@@ -133,11 +147,7 @@ def touch_solver(
         ratio = ratio[parent]
     if balls:
         ratio = with_balls(fine, ratio, balls)
-    solver = Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold)
-    if made is not None:
-        made.clear()
-        made[key] = solver
-    return solver
+    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold)
 
 
 @contextmanager

@@ -272,10 +272,12 @@ class Presses:
     @property
     def lost_work(self) -> float:
         """Share of the work of pressing in, along the normal, that does not come back; median of presses."""
+        from scipy.integrate import cumulative_trapezoid
+
         lost = []
         for part in self.parts:
-            force, depth = self.local_force[part, 0], self.travel[part, 0]
-            work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(depth))])
+            depth = self.travel[part, 0]
+            work = cumulative_trapezoid(self.local_force[part, 0], depth, initial=0.0)
             if (spent := work[np.argmax(depth)]) > 0:
                 lost.append(work[-1] / spent)
         return float(np.median(lost)) if lost else 0.0

@@ -59,13 +59,16 @@ def _surface(result: Reconstruction) -> str:
             "Surface. The convex hull of the touches, as in the paper. Hands do not touch rims, so it lies "
             "inside a convex object."
         )
-    held = f"holds {100 * hull / surface.volume_m3:.0f} % of the volume of the surface used here"
     if not np.isfinite(hull):
-        held = "is not the surface used here"
+        return (
+            f"Surface. The paper takes the convex hull of the touches, here it is a {surface.method}: "
+            f"{surface.reason}."
+        )
     return (
-        f"Surface. The paper takes the convex hull of the touches. Hands do not touch rims: the hull {held} "
-        f"({surface.method}), which {surface.reason}. A smaller object gives more easily, so the hull's "
-        "modulus comes out too high."
+        f"Surface. The paper takes the convex hull of the touches. Hands do not touch rims: the hull holds "
+        f"{100 * hull / surface.volume_m3:.0f} % of the volume of the surface used here "
+        f"({surface.method}), which "
+        f"{surface.reason}. A smaller object gives more easily, so the hull's modulus comes out too high."
     )
 
 

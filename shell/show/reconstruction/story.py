@@ -129,8 +129,9 @@ def _taken(result: Reconstruction) -> str:
 def _meant(result: Reconstruction) -> say.Story:
     yield say.Detail(_taken(result))
     if not result.doubt:
-        yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in meaning(result).split(". "))
-        yield say.Detail(meaning(result), on=say.PAGE)
+        words = meaning(result)
+        yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in words.split(". "))
+        yield say.Detail(words, on=say.PAGE)
 
 
 def _made(result: Reconstruction) -> say.Story:
