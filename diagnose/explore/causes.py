@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from palpate.diagnosis.explore.estimate import ExplorationEstimate
 from palpate.diagnosis.explore.weighing import Act, Weighing, weigh
@@ -33,9 +34,10 @@ NONE = "none"
 FALSE_ALARMS = 0.02
 """Probability of ruling 'none' out at any time where it is true."""
 SIZES = np.geomspace(1.0, 100.0, 13)
-"""Sizes of a cause that are weighed, times `least_n`."""
+"""Sizes of a cause that are weighed, times `least_n`: each span between two of them is as likely, and within
+it each size."""
 SMALL = np.linspace(0.0, 1.0, 5)
-"""Sizes that are none, times `least_n`: what is too small to matter, a cause or an error of ours alike."""
+"""Sizes that are none, likewise: what is too small to matter, a cause or an error of ours alike."""
 LEAST_SHARE = Smallest.exploring.value
 """Of the force: a smaller change does not matter, however plainly many presses show it."""
 TWO_SIGNED = frozenset({"inclusion"})
@@ -174,13 +176,33 @@ def likeliest(w: Weighing, name: str, least_n: float) -> tuple[Act, float] | Non
 def _evidence(
     w: Weighing, rows: list[int], target: np.ndarray, curve: np.ndarray, sizes_n: np.ndarray, over: float
 ) -> np.ndarray:
-    """Log likelihood ratios to the ideal model of the forms `rows` at all sizes (k,) N, both signs where it
-    has both."""
-    size = np.maximum(w.sizes[rows], 1e-9)
-    factor = sizes_n[None] / size[:, None]
+    """Log likelihood ratios to the ideal model of the forms `rows`, each the mean over the spans between sizes
+    (k,) N, both signs where it has both."""
+    edges = sizes_n / np.maximum(w.sizes[rows], 1e-9)[:, None]
+    curved = curve[rows, None] / over
     signs = (1.0, -1.0) if w.names[rows[0]] in TWO_SIGNED else (1.0,)
-    log = [s * factor * target[rows, None] - 0.5 * factor**2 * curve[rows, None] for s in signs]
-    return np.concatenate(log).ravel() / over
+    return np.concatenate([_mean_over(edges, s * target[rows, None] / over, curved).ravel() for s in signs])
+
+
+def _mean_over(edges: np.ndarray, target: np.ndarray, curve: np.ndarray) -> np.ndarray:
+    """(f, k - 1) logarithm of the mean of exp(target x - curve x^2 / 2) over x between two of edges (f, k);
+    target, curve (f, 1).
+
+    By the normal distribution: where readings are many a size between two points of a grid is missed by
+    thousands of nats.
+    """
+    low, high = edges[:, :-1], edges[:, 1:]
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    at_middle = target * middle - 0.5 * curve * middle**2
+    root = np.sqrt(np.maximum(curve, 1e-300))
+    # standard deviations from the most likely x, on the side where the tail is that keeps its digits
+    near, far = root * low - target / root, root * high - target / root
+    upper = near > 0
+    near, far = np.where(upper, -far, near), np.where(upper, -near, far)
+    share = log_ndtr(far) + np.log1p(-np.exp(np.minimum(log_ndtr(near) - log_ndtr(far), -1e-16)))
+    wide = 0.5 * (target / root) ** 2 + share + 0.5 * np.log(2 * np.pi) - np.log(root * 2 * half)
+    straight = (np.abs(target - curve * middle) + root) * half < 1e-4
+    return np.where(straight, at_middle, wide)
 
 
 def _log_mean(log: np.ndarray) -> float:

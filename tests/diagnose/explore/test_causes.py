@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 
-from palpate.diagnosis.explore.causes import NONE, SIZES, Causes, judge
+from palpate.diagnosis.explore.causes import NONE, SIZES, Causes, _mean_over, judge
 from palpate.diagnosis.explore.state import cause_goal
 from palpate.diagnosis.explore.weighing import Weighing
 
@@ -75,3 +76,27 @@ def test_what_is_ruled_out_follows_from_ratios_to_the_mean_of_all():
 
 def test_sizes_that_are_weighed_span_what_can_be_felt():
     assert SIZES[0] == 1.0 and SIZES[-1] >= 100
+
+
+def test_the_evidence_of_a_size_is_the_mean_over_it_however_plainly_readings_tell():
+    edges = np.array([[0.3, 0.5, 2.0, 7.0]])
+    for target, curve in ((0.0, 0.0), (1e-9, 1e-12), (3.0, 2.0), (-40.0, 30.0), (900.0, 700.0), (60.0, 1e-3)):
+        told = _mean_over(edges, np.array([[target]]), np.array([[curve]]))[0]
+        for low, high, found in zip(edges[0, :-1], edges[0, 1:], told, strict=True):
+            x = low + (high - low) * (np.arange(100_000) + 0.5) / 100_000
+            mean = logsumexp(target * x - 0.5 * curve * x**2) - np.log(len(x))
+            assert found == pytest.approx(mean, abs=1e-3), (target, curve, low)
+
+
+def test_what_explains_as_much_is_as_likely_whatever_its_size_beside_the_grid():
+    """Two forms of one shape, one of another unit: their sizes lie anywhere between two points of the grid."""
+    told = []
+    for unit in np.geomspace(1.0, SIZES[1], 5):
+        gram = np.diag([4e6 + 100.0, 1e3, 1e5 * unit**2])
+        gram[0, 2] = gram[2, 0] = 2.0 * 1e5 * unit
+        forward = SimpleNamespace(touches=SimpleNamespace(noise=SimpleNamespace(variance_inflation=1.0)))
+        weighing = Weighing(
+            forward, None, None, (), ("cause",), np.ones(1), gram, 0, 1e4, np.ones(1), np.zeros(1), None
+        )
+        told.append(judge(weighing, 0.05).log_evidence["cause"])
+    assert np.ptp(told) < 2.0, told
