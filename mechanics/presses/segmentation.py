@@ -69,11 +69,13 @@ def free_segments(
 
 
 def measured_noise(
-    recording: Recording, free: np.ndarray, read_n: np.ndarray, usual_n: float = USUAL_NOISE_N
+    recording: Recording, free: np.ndarray, read_n: np.ndarray | None, usual_n: float = USUAL_NOISE_N
 ) -> Noise:
     """The noise in free air, (n,) bool; the stated (or the usual) value, white, where there is too little.
 
-    read_n: (n, 3) N, what the air reads beside it: level, drift, and a tool's weight and inertia.
+    read_n: (n, 3) N, what the air reads beside it: level, drift, and a tool's weight and inertia. None where
+    that is followed straight from one touch to the next, as a tool that turns unseen wanders by more than the
+    sensor does: then noise is what a mean differs by from the line through its neighbours.
 
     A recording that was read more slowly than it is sampled ([recording] read_rate_hz) has no more noise
     than its readings had, and that lasts from one reading to the next.
@@ -91,14 +93,19 @@ def measured_noise(
         return Noise(stated, stated / np.sqrt(per_step), 1.0)
     steps = np.diff(force, axis=0)[free[1:] & free[:-1]]
     white = max(_robust_std(steps) / np.sqrt(2), 1e-4)
-    left = force - read_n[:, axes]
+    left = force if read_n is None else force - read_n[:, axes]
     line = np.polyfit(recording.t[free], left[free], 1)
-    left -= recording.t[:, None] * line[0] + line[1]
-    stretches = runs(free)
+    left = left - (recording.t[:, None] * line[0] + line[1])
 
     def of_means(size: int) -> float:
-        means = [left[k : k + size].mean(axis=0) for a, b in stretches for k in range(a, b - size + 1, size)]
-        return _robust_std(np.array(means)) if len(means) > 20 else white / np.sqrt(size)
+        means = [
+            left[a : b - (b - a) % size].reshape(-1, size, left.shape[1]).mean(axis=1) for a, b in runs(free)
+        ]
+        apart = [np.diff(each, 2, axis=0) / np.sqrt(6) for each in means]  # as Hadamard's variance has it
+        for values in [apart, means] if read_n is None else [means]:
+            if sum(map(len, values)) > 20:
+                return _robust_std(np.concatenate(values))
+        return white / np.sqrt(size)
 
     step = max(of_means(per_step), white / np.sqrt(per_step))
     inflation = of_means(10 * per_step) ** 2 * 10 / step**2
@@ -211,7 +218,7 @@ def segment_recording(
         recording=recording.content,
     )
     quiet = table.within("free", t)
-    read_n = np.zeros_like(free) if around.followed else free
+    read_n = None if around.followed else free
     return dataclasses.replace(
         table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet, read_n, noise)
     )

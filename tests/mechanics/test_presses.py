@@ -79,6 +79,17 @@ def test_what_a_swung_tool_reads_is_no_noise():
     assert noise.variance_inflation < 1.5
 
 
+def test_what_a_tool_that_turns_unseen_wanders_by_is_no_noise():
+    """It is followed straight from one touch to the next; an effect of three times the noise was taken for it."""
+    made = recording(noise=0.005)
+    read = 0.1 * np.sin(np.array([0.9, 0.7, 1.1]) * made.t[:, None])
+    turned = dataclasses.replace(made, force_on_tool=made.force_on_tool + read)
+    noise = table(turned, free_air=read, followed=True).noise
+    assert noise.raw_n == pytest.approx(0.005, rel=0.05)
+    assert noise.step_n == pytest.approx(0.005 / np.sqrt(10), rel=0.15)
+    assert noise.variance_inflation < 2.0
+
+
 def test_rows_are_seen_from_the_place_that_was_touched():
     presses = table(recording(noise=0.0))
     assert presses.travel[:, 0] == pytest.approx(presses.depth, abs=1e-12)
