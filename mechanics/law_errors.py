@@ -202,10 +202,10 @@ class Unnamed:
         "lack of fit above 0.95 by it, and none is given a cause",
     )  # fmt: skip
     alike = OwnError(
-        0.002, "1", "force in proportion to itself, in any form that bends the law of all presses alike",
+        0.0014, "1", "force in proportion to itself, in any form that bends the law of all presses alike",
         "all places",
-        "silicones of another simulator without a flaw hold 17 nats for a skin that changes 0.2 % of the "
-        "force, domes of the laboratory 19 for another flaw of 0.5 %: no law of ours is as exact",
+        "what is not there changes the force of sound objects by 0.2 % (17 nats, a silicone of another "
+        "simulator) to 0.6 % (9 nats, a dome of the laboratory); by this width 0.6 % hold 9 nats",
     )  # fmt: skip
     along = OwnError(
         6.25, "1", "variance of that share in a sum along a press, over that of one anew at each sample",

@@ -16,7 +16,7 @@ from scipy.special import expit
 
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import settings_of
-from palpate.diagnosis.search.gaps import beside_modulus_n
+from palpate.diagnosis.search.gaps import beside_modulus_n, modulus_share
 from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import WEIGHTS, most_told
 from palpate.diagnosis.search.rivals import of_one_phenomenon
@@ -71,7 +71,7 @@ class Patterns:
         counted = forward.touches.counted
         settings = settings_of(forward, found.effects, found.values, found.onset)
         before = np.nan_to_num(forward.predict(settings))
-        columns, own, size, beyond = [found.jacobian[:, :, 0]], [], [], []
+        columns, own, size, forms = [found.jacobian[:, :, 0]], [], [], []
         for number, effect in enumerate(effects):
             for form in forms_of(search, effect):
                 settings = settings_of(forward, found.effects, found.values, found.onset)
@@ -83,12 +83,18 @@ class Patterns:
                     columns.append(change)
                     own.append(number)
                     size.append(rms)
-                    beyond.append(most_told(effect, form, rms / forward.touches.force_rms_n))
-        self.own, self.size, self.beyond = np.array(own, dtype=int), np.array(size), np.array(beyond)
+                    forms.append(form)
+        self.own, self.size = np.array(own, dtype=int), np.array(size)
         shown = np.stack(columns, axis=2)
+        # as a score has it: modulus and first touches are where the plain misfit is least, with it and without
+        level = [modulus_share(change[counted], before[counted]) for change in columns[1:]]
+        seen = without_first_touches(search, shown[:, :, 1:] - before[:, :, None] * level, plainly=True)
+        left = [beside_modulus_n(change[counted], before[counted]) for change in np.moveaxis(seen, 2, 0)]
         if fitted:
             shown[:, :, 1:] = without_first_touches(search, shown[:, :, 1:])
-        self.columns = shown
+        shares = np.array(left) / forward.touches.force_rms_n
+        told = [most_told(effects[k], form, s) for k, form, s in zip(own, forms, shares, strict=True)]
+        self.beyond, self.columns = np.array(told), shown
         drawn = whitener.drawn(DRAWS, np.random.default_rng(seed))
         both = np.concatenate([shown, drawn], axis=2)
         self.white = Products.of(whitener.gram(both), shown.shape[2])
@@ -239,19 +245,22 @@ def _summed(x: np.ndarray, others: bool) -> np.ndarray:
     return total - x if others else np.broadcast_to(total, x.shape)
 
 
-def without_first_touches(search: Search, changes: np.ndarray) -> np.ndarray:
+def without_first_touches(search: Search, changes: np.ndarray, *, plainly: bool = False) -> np.ndarray:
     """(n, 3, c) N, changes less what first touches take up that are free: the likeliest by the covariance, so
-    that no change becomes plainer by it."""
-    t = search.forward.touches
-    column = np.where(t.counted[:, None], search.whitener.onset_column, 0.0)
+    that no change becomes plainer by it; plainly, those of the plain misfit, as wide as they are."""
+    t, whitener = search.forward.touches, search.whitener
+    column = np.where(t.counted[:, None], whitener.onset_column, 0.0)
     rank = np.zeros(len(t), dtype=int)  # of a press among those of its site
     for site in range(t.sites):
         own = np.flatnonzero(t.site == site)
         rank[own] = np.arange(len(own))
     of_rank = rank[t.press][:, None] == np.arange(rank.max() + 1)
     each = column[:, :, None] * of_rank[:, None, :]
-    gram = search.whitener.gram(np.concatenate([each, changes], axis=2))
-    k = each.shape[2]
+    both = np.concatenate([each, changes], axis=2)
+    gram, k = whitener.gram(both), each.shape[2]
+    if plainly:
+        gram = whitener.raw_gram(both) / whitener.variance
+        gram[t.site, rank, rank] += 1 / whitener.onset_sd**2
     taken = np.linalg.pinv(gram[:, :k, :k], hermitian=True) @ gram[:, :k, k:]
     moved: np.ndarray = np.einsum("nrk,nkc->nrc", each, taken[t.site[t.press]])
     return changes - moved
