@@ -142,7 +142,7 @@ class DepthLaw:
     field = OwnError(0.03, "1", "force of a sample, for a field or a comparison of models", "sample", _SET)
     dent_depth = OwnError(
         0.25, "1", "depth, in tip radii, at which the modulus of a dent is taken in a field", "place",
-        "chosen on slabs 1 to 3 of `palpate bench field`",
+        "chosen on slabs 1 to 3 of `benchmarks._tissue`",
     )  # fmt: skip
 
 
