@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks._known_shapes import SHAPES, KnownShape
-from benchmarks._pressed_places import FINENESS, in_laboratory, kept_force, rendered
+from benchmarks._pressed_places import FINENESS, NU, TIP_M, in_laboratory, kept_force, meshed, rendered
 from benchmarks.evidence import Figure
-from benchmarks.felt_surface import NU, TIP_M, meshed
 from benchmarks.timing import table
 from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.press_solver.press import PressOptions, PressSolver

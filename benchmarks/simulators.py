@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks._known_shapes import SHAPES
+from benchmarks._pressed_places import meshed
 from benchmarks.evidence import Figure
-from benchmarks.felt_surface import meshed
 from benchmarks.timing import table
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.material import ObjectMaterial
