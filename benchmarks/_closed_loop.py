@@ -279,3 +279,15 @@ def closed_loop(
         1.0 - 1.0 / (1.0 + stiffest * compliance),
         float(arrays.shared.counts[CONTACT_TICKS]) / n,
     )
+
+
+def side_by_side(off: ClosedLoopResult, on: ClosedLoopResult, **about: float) -> dict[str, float]:
+    """A case of a grid: what it was, and what the hand got back without controller and coupling and with."""
+    return {
+        **about,
+        "peak_force_n": float(np.linalg.norm(on.command, axis=1).max()),
+        "given_back_unguarded_j": off.given_back_j,
+        "given_back_j": on.given_back_j,
+        "force_distortion": on.force_distortion,
+        "stiffness_lost": on.stiffness_lost,
+    }

@@ -1,5 +1,6 @@
 """Nothing, and an elastic plane at z = 0, with a renderer's interface: for trying a device or a loop without
 a model, and as the empty loop of the benchmark.
+
 The plane is linear, without friction: force k d along z for the depth d of the tip, k behind the virtual
 coupling.
 """
