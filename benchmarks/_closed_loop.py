@@ -26,6 +26,7 @@ from palpate.render.coupling import (
     stiffest_n_per_m,
 )
 from palpate.render.passivity import PassivityOptions, passivity_parameters
+from palpate.render.replay import rms_n
 from palpate.render.scene import in_the_air
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views, write_block
 from palpate.servo.loop import make_program, one_tick
@@ -95,9 +96,9 @@ class ClosedLoopResult:
     def force_distortion(self) -> float:
         """rms of what controller and filter changed over rms of the rendered force, after the ramp."""
         full = slice(len(self.command) // 4, None)
-        rendered = np.sqrt((self.rendered[full] ** 2).sum(axis=1).mean())
-        changed = np.sqrt(((self.command[full] - self.rendered[full]) ** 2).sum(axis=1).mean())
-        return float(changed / rendered) if rendered > 0 else 0.0
+        rendered = rms_n(self.rendered[full])
+        changed = rms_n(self.command[full] - self.rendered[full])
+        return changed / rendered if rendered > 0 else 0.0
 
 
 @dataclass(frozen=True)

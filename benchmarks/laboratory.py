@@ -18,6 +18,7 @@ from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.recording.recording import Recording, read_recording
+from palpate.render.replay import rms_n
 from palpate.scenes.laboratory.curves import PathJob, Solving, curves
 from palpate.scenes.laboratory.specimen import Specimen
 from palpate.scenes.phantoms import Phantom, phantom
@@ -182,7 +183,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                     float(100 * difference.mean()),
                     float(100 * np.abs(difference).max()),
                     float(1e3 * shallow),
-                    float(1e3 * np.sqrt(((ours - press.force) ** 2).sum(axis=1).mean())),
+                    1e3 * rms_n(ours - press.force),
                 ]
             )
         together = by_depth(pairs)

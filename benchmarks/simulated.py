@@ -55,6 +55,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import plain
 from palpate.output import progress_bar
+from palpate.render.replay import rms_n
 from palpate.scenes.laboratory.sealing import digest
 
 LATE_S = 0.03
@@ -164,19 +165,19 @@ def _adapter_row(
         return runs.force(adapter, given(changes))
 
     whole, control = force(planted), force(())
-    sizes = {flaw.name: _rms((force([(flaw, change)]) - control)[counted]) for flaw, change in planted}
+    sizes = {flaw.name: rms_n((force([(flaw, change)]) - control)[counted]) for flaw, change in planted}
     rest = _key([each for each in planted if each[0].name != _largest(sizes)])
     sealed = _sealed([[flaw.name, *change.values()] for flaw, change in planted])
     # its best settings, given what it was given
     best = force([each for each in planted if each[0].parameter is not None])
     base = Forces(runs.block.t, best, adapter) if planted else None
     verdict = _verdict(world, Forces(runs.block.t, whole, adapter), given(planted).stated, base)
-    off = _rms((control - runs.law)[counted]) / _rms(runs.law[counted])
+    off = rms_n((control - runs.law)[counted]) / rms_n(runs.law[counted])
     right = {flaw.name: list(flaw.right) for flaw, _ in planted}
     limits = _limits(verdict)
     seen = [limits[n] for n in right.get(_largest(sizes), []) if n in limits]
     # of a parameter half the noise must be seen, whatever the force (`--smallest`)
-    least = max(0.02 * _rms(whole[counted]), min(seen or [0.5 * verdict.noise_n]))
+    least = max(0.02 * rms_n(whole[counted]), min(seen or [0.5 * verdict.noise_n]))
     row = _row(world, sealed, sizes, right, verdict, least, gaps.get(rest, verdict.gap_before_n))
     wrongly = set(row["named"]) if off < ALIKE else set(verdict.parts["parameters"].names)
     return {
@@ -249,20 +250,16 @@ def _judged(
     clean, _ = simulated(block, (), seed)
     force, given = simulated(block, planted, seed)
     counted = world.model.presses.touching(world.recording.t)
-    sizes = {f.name: _rms((simulated(block, [(f, x)], seed)[0] - clean)[counted]) for f, x in planted}
+    sizes = {f.name: rms_n((simulated(block, [(f, x)], seed)[0] - clean)[counted]) for f, x in planted}
     largest = _largest(sizes)
     rest, _ = simulated(block, [(f, x) for f, x in planted if f.name != largest], seed)
     sealed = _sealed([[f.name, x] for f, x in planted])
     stated = Stated(given.modulus_pa, given.poisson, given.friction, given.radius_m, frozenset(KEYS))
     verdict = _verdict(world, Forces(block.t, force, "planted"), stated)
-    least = 0.02 * _rms(verdict.simulated)
+    least = 0.02 * rms_n(verdict.simulated)
     seen = max(_limits(verdict).get(largest, least), least)
-    left_n = _rms((world.recording.force_on_tool - rest)[counted])
+    left_n = rms_n((world.recording.force_on_tool - rest)[counted])
     return _row(world, sealed, sizes, {f.name: [f.name] for f, _ in planted}, verdict, seen, left_n)
-
-
-def _rms(force: np.ndarray) -> float:
-    return float(np.sqrt((force**2).sum(axis=1).mean()))
 
 
 def _largest(sizes: Mapping[str, float]) -> str:

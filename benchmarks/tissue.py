@@ -20,13 +20,14 @@ from scipy.interpolate import PchipInterpolator
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from palpate.diagnosis.compare.models import HOMOGENEOUS, MODELS, RIVALS, predicted, prepare, rms
+from palpate.diagnosis.compare.models import HOMOGENEOUS, MODELS, RIVALS, predicted, prepare
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.output import progress_bar
 from palpate.reconstruction.presses_on_model import presses_on
+from palpate.render.replay import rms_n
 from palpate.scenes.laboratory.curves import Curve, PathJob, Solving, curves
 from palpate.scenes.laboratory.effects import Bench, effect
 from palpate.scenes.laboratory.specimen import Fineness, Specimen
@@ -186,7 +187,7 @@ def held_out(made: RobotTissue, rows: int | None, seed: int, folds: int) -> dict
         for name in MODELS:
             missed[name][at] = ((found[name] - presses.force[at]) ** 2).sum(axis=1)
     errors = {name: float(np.sqrt(squares.mean())) for name, squares in missed.items()}
-    return {**errors, "noise": made.noise_n * 3**0.5, "fields": fields, "force": rms(presses.force)}
+    return {**errors, "noise": made.noise_n * 3**0.5, "fields": fields, "force": rms_n(presses.force)}
 
 
 def _slab(made: RobotTissue) -> Model:
