@@ -32,7 +32,7 @@ from palpate.mechanics.progress import silent
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.render.options import BEST, RenderOptions
 from palpate.render.registry import create
-from palpate.render.replay import replay
+from palpate.render.replay import replay, rms_n
 from palpate.render.simulators import base
 
 POISSON = 0.40
@@ -121,7 +121,7 @@ class Parameters:
         self._sizes: dict[tuple[str, int], list[float]] = {}
 
     def _rms(self, force: np.ndarray) -> float:
-        return float(np.sqrt((force[self._pressed] ** 2).sum(axis=1).mean()))
+        return rms_n(force[self._pressed])
 
     def sizes_n(self, field: str, side: int) -> list[float]:
         """N rms, of each of WRONG[field][side]."""

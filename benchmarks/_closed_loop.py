@@ -26,6 +26,7 @@ from palpate.render.coupling import (
     stiffest_n_per_m,
 )
 from palpate.render.passivity import PassivityOptions, passivity_parameters
+from palpate.render.replay import rms_n
 from palpate.render.scene import in_the_air
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views, write_block
 from palpate.servo.loop import make_program, one_tick
@@ -95,9 +96,9 @@ class ClosedLoopResult:
     def force_distortion(self) -> float:
         """rms of what controller and filter changed over rms of the rendered force, after the ramp."""
         full = slice(len(self.command) // 4, None)
-        rendered = np.sqrt((self.rendered[full] ** 2).sum(axis=1).mean())
-        changed = np.sqrt(((self.command[full] - self.rendered[full]) ** 2).sum(axis=1).mean())
-        return float(changed / rendered) if rendered > 0 else 0.0
+        rendered = rms_n(self.rendered[full])
+        changed = rms_n(self.command[full] - self.rendered[full])
+        return changed / rendered if rendered > 0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -279,3 +280,15 @@ def closed_loop(
         1.0 - 1.0 / (1.0 + stiffest * compliance),
         float(arrays.shared.counts[CONTACT_TICKS]) / n,
     )
+
+
+def side_by_side(off: ClosedLoopResult, on: ClosedLoopResult, **about: float) -> dict[str, float]:
+    """A case of a grid: what it was, and what the hand got back without controller and coupling and with."""
+    return {
+        **about,
+        "peak_force_n": float(np.linalg.norm(on.command, axis=1).max()),
+        "given_back_unguarded_j": off.given_back_j,
+        "given_back_j": on.given_back_j,
+        "force_distortion": on.force_distortion,
+        "stiffness_lost": on.stiffness_lost,
+    }

@@ -27,31 +27,17 @@ class NotSolved(PalpateError):
 def tasks_of(case: Case, work: Path, *, solve: bool, fast: bool) -> list[Task]:
     """Solve what the object's cases share (where touches may be solved at all), prepare, judge."""
     work = work.resolve()
-    own = [_solved(case.number, kind, work) for kind in _kinds(case)] if solve else []
-    own.append(_prepared(case, work, solve, tuple(task.name for task in own)))
-    own.append(_judged(case, work, fast, own[-1].name))
+    own = []
+    if solve:
+        # an effect's size is told against what is left without it
+        for finite in (False, True) if FINITE in case.effects else (False,):
+            label = f"{case.number}-{'neo-hookean' if finite else 'linear'}"
+            own.append(_task("solve", label, {"number": case.number, "finite": finite}, work, ()))
+    needs = tuple(task.name for task in own)
+    own.append(_task("prepare", case.recording, {"case": _of(case, ""), "solve": solve}, work, needs))
+    judged = {"case": _of(case, case.without), "fast": fast}
+    own.append(_task("judge", case.key, judged, work, (own[-1].name,)))
     return own
-
-
-def _kinds(case: Case) -> tuple[bool, ...]:
-    """Whether linear (False), neo-Hookean (True) or both: an effect's size is told against what is left
-    without it.
-    """
-    return (False, True) if FINITE in case.effects else (False,)
-
-
-def _solved(number: int, finite: bool, work: Path) -> Task:
-    label = f"{number}-{'neo-hookean' if finite else 'linear'}"
-    return _task("solve", label, {"number": number, "finite": finite}, work, ())
-
-
-def _prepared(case: Case, work: Path, solve: bool, needs: tuple[str, ...]) -> Task:
-    content = {"case": _of(case, ""), "solve": solve}
-    return _task("prepare", case.recording, content, work, needs)
-
-
-def _judged(case: Case, work: Path, fast: bool, prepared: str) -> Task:
-    return _task("judge", case.key, {"case": _of(case, case.without), "fast": fast}, work, (prepared,))
 
 
 def _of(case: Case, without: str) -> dict[str, Any]:

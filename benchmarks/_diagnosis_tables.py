@@ -1,11 +1,8 @@
-"""The blind benchmark's tables and pictures, targets beside what was measured."""
+"""The blind benchmark's tables, targets beside what was measured."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from benchmarks.timing import table
 
@@ -87,56 +84,3 @@ def show(summary: dict[str, Any]) -> None:
         print(table(["missed", "verdict", "named", "candidates"],
                     [[m["case"], m["verdict"], ", ".join(m["effects"]), ", ".join(m["candidates"])]
                      for m in summary["misses"]]))  # fmt: skip
-
-
-def pictures(summary: dict[str, Any], path: Path | str) -> Path:
-    """Confusion matrix, detection by size, and stated probabilities against what was true, as one PNG."""
-    from matplotlib.figure import Figure
-
-    rows = sorted({a for a, _, _ in summary["confusion"]})
-    columns = sorted({b for _, b, _ in summary["confusion"]})
-    figure = Figure(figsize=(14, 3.5 + 0.26 * len(rows)), layout="constrained")
-    axes = figure.subplot_mosaic([["matrix", "curve"], ["matrix", "calibration"]], width_ratios=[2.0, 1])
-    _confusion(axes["matrix"], summary["confusion"], rows, columns)
-    _curve(axes["curve"], summary["detection_by_size"])
-    bins = summary["calibration"]["bins"]
-    axes["calibration"].plot([0, 1], [0, 1], color="#999999", lw=0.8)
-    axes["calibration"].scatter(
-        [b["stated"] for b in bins], [b["true"] for b in bins],
-        s=[15 + 4 * np.sqrt(b["of"]) for b in bins], color="#1d3557",
-    )  # fmt: skip
-    axes["calibration"].set(xlabel="stated probability", ylabel="share that was true", title="calibration")
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=100)
-    return path
-
-
-def _confusion(axis: Any, counts: list[list[Any]], rows: list[str], columns: list[str]) -> None:
-    matrix = np.zeros((len(rows), len(columns)))
-    for a, b, n in counts:
-        matrix[rows.index(a), columns.index(b)] = n
-    share = matrix / np.maximum(matrix.sum(axis=1, keepdims=True), 1)
-    axis.imshow(np.where(matrix > 0, share, np.nan), cmap="Blues", vmin=0, vmax=1.4, aspect="auto")
-    for i, j in zip(*np.nonzero(matrix), strict=True):
-        axis.text(j, i, f"{matrix[i, j]:.0f}", ha="center", va="center", fontsize=8)
-    axis.set_xticks(range(len(columns)), [c.replace("_", " ") for c in columns], rotation=60, ha="right")
-    axis.set_yticks(range(len(rows)), [r.replace("_", " ").replace("+", " + ") for r in rows])
-    axis.set(xlabel="named first", ylabel="sealed (in brackets: not in the library)")
-
-
-def _curve(axis: Any, bins: list[dict[str, Any]]) -> None:
-    for key, words, colour, shift in (
-        ("detected", "something is there", "#1d3557", -0.06),
-        ("named_first", "named first", "#e63946", 0.06),
-    ):
-        of = [b for b in bins if b[key]["of"]]
-        x = np.arange(len(of)) + shift
-        p, low, high = np.array([b[key]["rate_and_interval"] for b in of]).reshape(-1, 3).T
-        bars = np.maximum([p - low, high - p], 0.0)  # rounding
-        axis.errorbar(x, p, yerr=bars, fmt="o-", color=colour, label=words, capsize=3)
-        axis.set_xticks(np.arange(len(of)), [
-            (f"{b['from']:g}-{b['to']:g}" if b["to"] < 1e8 else f">{b['from']:g}") + f"\n({b[key]['of']})"
-            for b in of])  # fmt: skip
-    axis.set(ylim=(-0.03, 1.03), xlabel="effect's force over the noise (cases)", ylabel="share, Wilson 95 %")
-    axis.legend(loc="lower right")

@@ -64,7 +64,7 @@ def thread_cpu_ns(timespec):
 
 def block_model(touchable: int) -> Model:
     """A silicone block of quadratic tetrahedra with about that many touchable nodes."""
-    mesh = block(touchable, 2)
+    mesh = block(touchable)
     low = mesh.points.min(axis=0)
     return Model(
         mesh=mesh,

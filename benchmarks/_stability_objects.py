@@ -7,11 +7,12 @@ drags over the crown to the other side, lets go, and does it again.
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
+from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop, side_by_side
 from palpate.devices.impedance import HandImpedance
 from palpate.devices.virtual_hand import SPEC
 from palpate.mechanics.model.material import ObjectMaterial
@@ -77,13 +78,7 @@ def one(
         SPEC,
         HandImpedance(*hand),
         press_and_drag(loop.rate_hz),
-        loop=Loop(
-            loop.rate_hz,
-            loop.quantisation_m,
-            loop.delay_s,
-            coupling=active,
-            passivity=PassivityOptions(passivity=active),
-        ),
+        loop=replace(loop, coupling=active, passivity=PassivityOptions(passivity=active)),
         tip_offsets_m=offsets,
     )
 
@@ -96,23 +91,11 @@ def cases() -> list[dict[str, Any]]:
     for modulus, friction, hand, delay, quantum, tips in grid:
         renderer = base.with_modulus(modulus).with_friction(friction)
         loop = Loop(1000.0, quantum, delay)
-        off = one(renderer, hand, loop, tips, active=False)
-        on = one(renderer, hand, loop, tips, active=True)
-        found.append(
-            {
-                "young_modulus_pa": modulus,
-                "friction": friction,
-                "mass_kg": hand[0],
-                "damping_n_s_per_m": hand[1],
-                "stiffness_n_per_m": hand[2],
-                "delay_s": delay,
-                "quantisation_m": quantum,
-                "tips": tips,
-                "peak_force_n": float(np.linalg.norm(on.command, axis=1).max()),
-                "given_back_unguarded_j": off.given_back_j,
-                "given_back_j": on.given_back_j,
-                "force_distortion": on.force_distortion,
-                "stiffness_lost": on.stiffness_lost,
-            }
-        )
+        off, on = (one(renderer, hand, loop, tips, active=active) for active in (False, True))
+        about = {
+            "young_modulus_pa": modulus, "friction": friction, "mass_kg": hand[0],
+            "damping_n_s_per_m": hand[1], "stiffness_n_per_m": hand[2], "delay_s": delay,
+            "quantisation_m": quantum, "tips": tips,
+        }  # fmt: skip
+        found.append(side_by_side(off, on, **about))
     return found

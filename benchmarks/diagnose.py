@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks._diagnosis_blind import opened_case, tasks_of, unfinished, verdict_path
 from benchmarks._diagnosis_cases import POOLS, SEEDS, Case, cases
 from benchmarks._diagnosis_scores import summarise
-from benchmarks._diagnosis_tables import TARGETS, pictures, show
+from benchmarks._diagnosis_tables import TARGETS, show
 from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
 from palpate.mechanics.errors import OptionError
@@ -95,7 +95,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="leave cases with a verdict in this folder out of the table: rules were chosen after those",
     )
-    parser.add_argument("--picture", metavar="PNG", help="write the pictures")
     parser.add_argument(
         "--cases",
         choices=tuple(SEEDS),
@@ -133,8 +132,6 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         for figure in rates({name: (rate["hits"], rate["of"])})
     ]
     show(summary)
-    if arguments.picture and done:
-        print(f"picture: {pictures(summary, arguments.picture)}")
     return summary
 
 

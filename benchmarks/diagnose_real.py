@@ -11,6 +11,7 @@ sphere of 5 mm is taken.
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,6 @@ import numpy as np
 import palpate as pp
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
 from palpate.diagnosis.specimen.result import FLOORS, Material
 from palpate.mechanics.errors import RecordingError
 from palpate.reconstruction.machine_curves.uniaxial import CEILING
@@ -59,11 +59,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         medians[name] = {key: float(np.median([row[key] for row in own])) for key in _SHARES}
         shares = ", ".join(f"{key} {100 * value:.2g} %" for key, value in medians[name].items())
         print(f"{name}, medians of {len(own)}: {shares}")
-    figures: dict[str, Any] = {"rows": rows, "medians": medians, "figures": _over_floor(rows, names)}
-    if "beef" in names:
-        # what no diagnosis of other pieces can tell: a hold from its own ramp
-        figures["unseen_holds"] = holds_table(root / BEEF, arguments.session.split(",")[0], arguments.pieces)
-    return figures
+    return {"rows": rows, "medians": medians, "figures": _over_floor(rows, names)}
 
 
 def _over_floor(rows: list[dict[str, Any]], names: list[str]) -> list[Figure]:
@@ -146,6 +142,15 @@ def _fish(folder: Path, arguments: argparse.Namespace) -> Rows:
         yield path.stem[-20:], pp.material(path, progress=False)
 
 
+_PIECE = re.compile(r"(\d+_)+(FF|RDG)(\d_)?\d[a-z]$", re.IGNORECASE)
+"""A piece's name, its session once or twice before it; the others are averages and longer tests."""
+
+
+def pieces_of(folder: Path, session: str) -> list[Path]:
+    """The pieces of beef of a session."""
+    return [p for p in sorted((folder / "csv").glob(f"{session}_*.csv")) if _PIECE.match(p.stem)]
+
+
 def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
     for session in arguments.session.split(","):
         files = pieces_of(folder, session)[: arguments.pieces]
@@ -169,6 +174,6 @@ SETS: dict[str, Callable[[Path, argparse.Namespace], Rows]] = {
     "silicones": _silicones, "elastomers": _elastomers, "chiaro": _chiaro, "fish": _fish, "beef": _beef,
 }  # fmt: skip
 FOLDERS = {
-    "silicones": SILICONES, "elastomers": "srmd_tensile", "chiaro": "chiaro_sphere_1khz",
-    "fish": "fishmuscle_relaxation", "beef": BEEF,
+    "silicones": "tissue_phantom_compression", "elastomers": "srmd_tensile", "chiaro": "chiaro_sphere_1khz",
+    "fish": "fishmuscle_relaxation", "beef": "meat_indentation_relaxation",
 }  # fmt: skip

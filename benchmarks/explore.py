@@ -20,11 +20,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks._explore_phantoms import Sealed, robot_of, sealed, strengthened
-from benchmarks._orders import ORDERS
 from benchmarks.evidence import wilson
 from benchmarks.timing import table
 from palpate.diagnosis.explore.causes import NONE
-from palpate.diagnosis.explore.explorer import ExplorationState, Explorer
+from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Order
 from palpate.diagnosis.explore.goals import GoalOptions
 from palpate.mechanics.disk.scratch import cache_folder
 from palpate.mechanics.disk.store import content_key
@@ -33,6 +32,31 @@ from palpate.mechanics.errors import PalpateError
 from palpate.mechanics.shape.nearest import distance, sample
 from palpate.output import progress_bar
 from palpate.scenes.laboratory.specimen import VERSION as LABORATORY
+
+NEAR_M = 0.025
+"""How far a person's next press usually is from the last."""
+
+
+def spread(places: np.ndarray, touched: np.ndarray, here: np.ndarray, rng: np.random.Generator) -> int:
+    """The place farthest from all that were touched."""
+    away = np.linalg.norm(places[:, None] - touched[None], axis=2).min(axis=1)
+    return int(np.argmax(away))
+
+
+def at_random(places: np.ndarray, touched: np.ndarray, here: np.ndarray, rng: np.random.Generator) -> int:
+    """Any place."""
+    return int(rng.integers(len(places)))
+
+
+def person(places: np.ndarray, touched: np.ndarray, here: np.ndarray, rng: np.random.Generator) -> int:
+    """As people explore: mostly a neighbour of the last place, now and then somewhere else."""
+    away = np.linalg.norm(places - here, axis=1)
+    weight = np.exp(-((away / NEAR_M) ** 2) / 2) + 0.02
+    return int(rng.choice(len(places), p=weight / weight.sum()))
+
+
+ORDERS: dict[str, Order] = {"spread": spread, "person": person, "random": at_random}
+
 
 VERSION = 4
 """Of what an exploration does: raised when kept ones say nothing of the program any more."""

@@ -20,9 +20,8 @@ import numpy as np
 
 from benchmarks._known_shapes import KnownShape
 from benchmarks._more_shapes import EIGHT, KINDS, kinds, thickness
-from benchmarks._pressed_places import in_laboratory, kept_force, rendered
+from benchmarks._pressed_places import TIP_M, in_laboratory, kept_force, meshed, rendered
 from benchmarks.evidence import Figure
-from benchmarks.felt_surface import TIP_M, meshed
 from benchmarks.timing import table
 from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.press_solver.press import PressOptions, PressSolver

@@ -3,7 +3,6 @@
 The shapes are files of chords (benchmarks._known_shapes). At places spread over each, the laboratory presses
 a sticking tip of 5 mm straight in (finite strain, nu 0.49, its mesh graded towards the touch); the renderer
 follows the same path on its own mesh, with the exact modulus. Depths are counted from each one's own surface.
-Our own solver of a press may stand in for the laboratory: it takes a third of the time.
 `without` is the same renderer whose dent knows of the surface's curvature by the effective radius alone.
 Solved presses are kept in the user's cache.
 """
@@ -16,13 +15,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks._known_shapes import SHAPES, KnownShape
-from benchmarks._pressed_places import FINENESS, in_laboratory, kept_force, rendered
+from benchmarks._pressed_places import FINENESS, TIP_M, in_laboratory, kept_force, meshed, rendered
 from benchmarks.evidence import Figure
-from benchmarks.felt_surface import NU, TIP_M, meshed
 from benchmarks.timing import table
 from palpate.mechanics.disk.store import content_key
-from palpate.mechanics.press_solver.press import PressOptions, PressSolver
-from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.output import progress_bar
 from palpate.render.force_error import law_share
 from palpate.scenes.laboratory.specimen import Fineness
@@ -40,9 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--places", type=int, default=10, help="of each shape (default: 10)")
     parser.add_argument("--size-mm", type=float, default=10.0, help="of the renderer's mesh (default: 10)")
     parser.add_argument("--seed", type=int, default=11, help="of the places (default: 11)")
-    parser.add_argument(
-        "--truth", choices=("laboratory", "press-solver"), default="laboratory", help="(default: laboratory)"
-    )
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -52,8 +45,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         shape = SHAPES[name]()
         points, normals = shape.places(arguments.places, arguments.seed)
         mesh = meshed(shape, 1e-3 * arguments.size_mm)
-        solve = Laboratory(shape) if arguments.truth == "laboratory" else OwnSolver(shape, mesh)
-        truth = np.array([_solved(solve, *place) for place in zip(points, normals, strict=True)])
+        truth = np.array([_solved(shape, *place) for place in zip(points, normals, strict=True)])
         progress("places", (k + 1) / len(arguments.shapes))
         for tag, bent in (("without", False), ("law", True)):
             force, numbers = rendered(mesh, points, normals, DEPTHS_M, bent=bent)
@@ -103,60 +95,24 @@ def _whole(error: np.ndarray) -> tuple[str, str]:
     return f"{np.sqrt(np.nanmean(error**2)):.1f} %", f"{error.flat[np.nanargmax(np.abs(error))]:+.1f} %"
 
 
-class Laboratory:
-    """Whole bodies of a shape, by the virtual laboratory."""
-
-    name = "law by place 1"
-
-    def __init__(self, shape: KnownShape, fineness: Fineness = FINENESS) -> None:
-        self.shape, self._fineness = shape, fineness
-
-    @property
-    def made_of(self) -> str:
-        """What else its answers hang on."""
-        return repr(FINENESS) if self._fineness is FINENESS else repr((self._fineness, SHALLOW_M))
-
-    def finer(self) -> Laboratory:
-        """One for shallow touches."""
-        return Laboratory(self.shape, SHALLOW)
-
-    def __call__(self, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """(depths,) m^2: normal force over the modulus; NaN from where it finds no equilibrium."""
-        deepest = DEPTHS_M[-1] if self._fineness is FINENESS else SHALLOW_M
-        depths, force = DEPTHS_M[DEPTHS_M <= deepest], np.full(len(DEPTHS_M), np.nan)
-        force[: len(depths)] = in_laboratory(self.shape, point, normal, depths, fineness=self._fineness)
-        return force
-
-
-class OwnSolver:
-    """The same by mechanics.press_solver, on the tetrahedra of a mesh."""
-
-    name = "law by place, press solver 2"
-
-    def __init__(self, shape: KnownShape, mesh: TetMesh) -> None:
-        self.shape, options = shape, PressOptions(coupled=True)
-        self._solver = PressSolver(
-            mesh.linear(), (shape.vertices, shape.triangles), young_modulus_pa=1.0, poisson_ratio=NU,
-            tip_radius_m=TIP_M, options=options,
-        )  # fmt: skip
-        self.made_of = repr(options)
-
-    def __call__(self, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """(depths,) m^2: normal force over the modulus; NaN from where it finds no equilibrium."""
-        return self._solver.press(point, normal, DEPTHS_M).force @ normal
-
-
-def _solved(solve: Laboratory | OwnSolver, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """(depths,) m^2, where the laboratory is asked by its finer mesh as deep as that goes."""
-    force = _kept(solve, point, normal)
-    if isinstance(solve, Laboratory):
-        shallow = DEPTHS_M <= SHALLOW_M
-        force[shallow] = _kept(solve.finer(), point, normal)[shallow]
+def _solved(shape: KnownShape, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """(depths,) m^2 by the laboratory's whole body: normal force over the modulus, by its finer mesh as deep
+    as that goes; NaN from where it finds no equilibrium."""
+    force = _kept(shape, point, normal, FINENESS, DEPTHS_M[-1], repr(FINENESS))
+    shallow = DEPTHS_M <= SHALLOW_M
+    force[shallow] = _kept(shape, point, normal, SHALLOW, SHALLOW_M, repr((SHALLOW, SHALLOW_M)))[shallow]
     return force
 
 
-def _kept(solve: Laboratory | OwnSolver, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """What `solve` answers at a place, from the user's cache where it is there."""
-    shape = solve.shape
-    key = content_key(solve.name, shape.vertices, shape.triangles, point, normal, DEPTHS_M, solve.made_of)
-    return kept_force(key, lambda: solve(point, normal))
+def _kept(
+    shape: KnownShape, point: np.ndarray, normal: np.ndarray, fineness: Fineness, to_m: float, made_of: str
+) -> np.ndarray:
+    """(depths,) m^2 down to `to_m`, NaN below; from the user's cache where it is there."""
+
+    def solve() -> np.ndarray:
+        depths, force = DEPTHS_M[DEPTHS_M <= to_m], np.full(len(DEPTHS_M), np.nan)
+        force[: len(depths)] = in_laboratory(shape, point, normal, depths, fineness=fineness)
+        return force
+
+    at = (shape.vertices, shape.triangles, point, normal, DEPTHS_M)
+    return kept_force(content_key("law by place 1", *at, made_of), solve)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._free_air import FreeAir
+from benchmarks._elastic_plane import FreeAir
 from benchmarks._servo_load import LATE_NS, Load, Measured, renderer_of
 from benchmarks.evidence import Figure
 from benchmarks.timing import table

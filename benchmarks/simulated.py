@@ -22,7 +22,7 @@ from __future__ import annotations
 import argparse
 import json
 import secrets
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -30,7 +30,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._adapter_flaws import ALIKE, CONTROLS, LAYOUT, AdapterFlaw, Parameters, Runs, drawn_plan
+from benchmarks._adapter_flaws import (
+    ALIKE,
+    CONTROLS,
+    LAYOUT,
+    AdapterFlaw,
+    Parameters,
+    Runs,
+    Simulation,
+    drawn_plan,
+)
 from benchmarks._simulated_flaws import FLAWS, Block, Flaw, Given, simulated
 from benchmarks._simulated_scores import figures_of, print_cases
 from benchmarks.timing import table
@@ -46,6 +55,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import plain
 from palpate.output import progress_bar
+from palpate.render.replay import rms_n
 from palpate.scenes.laboratory.sealing import digest
 
 LATE_S = 0.03
@@ -77,39 +87,6 @@ class _Reality:
     late: bool
 
 
-@dataclass(frozen=True)
-class _Case:
-    """sizes: by flaw the N rms by which it changes the force. left_n: the gap without the largest one."""
-
-    number: int
-    planted: tuple[tuple[Flaw, float], ...]
-    sizes: dict[str, float]
-    left_n: float
-    sealed: str
-    salt: str
-    verdict: SimulatedGap
-    late: bool
-
-    @property
-    def truth(self) -> list[str]:
-        """Names, the largest first."""
-        return sorted(self.sizes, key=lambda n: -self.sizes[n])
-
-    @property
-    def named(self) -> list[str]:
-        """Numerics and parameters that the verdict names, as it orders them."""
-        return _named(self.verdict)
-
-    @property
-    def visible(self) -> float:
-        """Size of the largest over what can be seen of it."""
-        if not self.truth:
-            return 0.0
-        limits = {e.name: e.detectable_n for e in self.verdict.entries if np.isfinite(e.detectable_n)}
-        least = 0.02 * float(np.sqrt((self.verdict.simulated**2).sum(axis=1).mean()))
-        return self.sizes[self.truth[0]] / max(limits.get(self.truth[0], least), least)
-
-
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Plant, seal, judge, open; print what was found."""
     if arguments.adapter is not None:
@@ -132,7 +109,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             if name in rows:
                 continue
             seed = 1000 * arguments.seed + int(number)
-            rows[name] = _row(_judged(block, world(number % 3 == 2), plan[number], seed, int(number)))
+            rows[name] = _judged(block, world(number % 3 == 2), plan[number], seed)
             _keep(arguments.work, name, rows[name])
     return _said(list(rows.values()))
 
@@ -178,49 +155,34 @@ def _adapter_row(
     """Run, seal, judge one case. gaps: N by `_key`, of what was judged in the same world before."""
     counted = world.model.presses.touching(world.recording.t)
 
-    def force(changes: Sequence[tuple[AdapterFlaw, dict[str, float]]]) -> np.ndarray:
+    def given(changes: Sequence[tuple[AdapterFlaw, dict[str, float]]]) -> Simulation:
         simulation = CONTROLS[adapter]
         for _, change in changes:
             simulation = simulation.but(change)
-        return runs.force(adapter, simulation)
+        return simulation
 
-    def rms(f: np.ndarray) -> float:
-        return float(np.sqrt((f[counted] ** 2).sum(axis=1).mean()))
+    def force(changes: Sequence[tuple[AdapterFlaw, dict[str, float]]]) -> np.ndarray:
+        return runs.force(adapter, given(changes))
 
     whole, control = force(planted), force(())
-    sizes = {flaw.name: rms(force([(flaw, change)]) - control) for flaw, change in planted}
-    largest = max(sizes, key=lambda n: sizes[n], default="")
-    rest = _key([each for each in planted if each[0].name != largest])
-    simulation = CONTROLS[adapter]
-    for _, change in planted:
-        simulation = simulation.but(change)
-    truth = {"flaws": [[flaw.name, *change.values()] for flaw, change in planted]}
-    salt = secrets.token_hex(16)
-    sealed = digest(truth, salt)
+    sizes = {flaw.name: rms_n((force([(flaw, change)]) - control)[counted]) for flaw, change in planted}
+    rest = _key([each for each in planted if each[0].name != _largest(sizes)])
+    sealed = _sealed([[flaw.name, *change.values()] for flaw, change in planted])
     # its best settings, given what it was given
-    given = force([each for each in planted if each[0].parameter is not None])
-    base = Forces(runs.block.t, given, adapter) if planted else None
-    verdict = _verdict(world, Forces(runs.block.t, whole, adapter), simulation.stated, base)
-    named = _named(verdict)
-    off = rms(control - runs.law) / rms(runs.law)
+    best = force([each for each in planted if each[0].parameter is not None])
+    base = Forces(runs.block.t, best, adapter) if planted else None
+    verdict = _verdict(world, Forces(runs.block.t, whole, adapter), given(planted).stated, base)
+    off = rms_n((control - runs.law)[counted]) / rms_n(runs.law[counted])
     right = {flaw.name: list(flaw.right) for flaw, _ in planted}
-    at = [n for n in named if n in right.get(largest, [])]
-    known = {e.name: e.gap_after_n for e in verdict.entries}
-    limits = {e.name: e.detectable_n for e in verdict.entries if np.isfinite(e.detectable_n)}
-    seen = [limits[n] for n in right.get(largest, []) if n in limits]
+    limits = _limits(verdict)
+    seen = [limits[n] for n in right.get(_largest(sizes), []) if n in limits]
     # of a parameter half the noise must be seen, whatever the force (`--smallest`)
-    least = max(0.02 * rms(whole), min(seen or [0.5 * verdict.noise_n]))
-    wrongly = set(named) if off < ALIKE else set(verdict.parts["parameters"].names)
+    least = max(0.02 * rms_n(whole[counted]), min(seen or [0.5 * verdict.noise_n]))
+    row = _row(world, sealed, sizes, right, verdict, least, gaps.get(rest, verdict.gap_before_n))
+    wrongly = set(row["named"]) if off < ALIKE else set(verdict.parts["parameters"].names)
     return {
-        "truth": truth, "salt": salt, "sealed": sealed, "late_sensor": world.late, "sizes_n": sizes,
-        "right": right, "own": [*verdict.own.effects] if verdict.own else [], "own_share": off,
-        "made_up": plain(verdict.made_up), "named": named,
-        "times_visible": sizes[largest] / least if largest else 0.0,
-        "left_n": gaps.get(rest, verdict.gap_before_n), "kind": verdict.kind,
-        "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),
-        "shares": {name: part.share for name, part in verdict.parts.items()},
-        "said_left_n": known[at[0]] if at else None, "gap_n": verdict.gap_before_n,
-        "adds_up": _adds_up(verdict), "false_alarm": bool(wrongly),
+        **row, "right": right, "own": [*verdict.own.effects] if verdict.own else [], "own_share": off,
+        "made_up": plain(verdict.made_up), "false_alarm": bool(wrongly),
     }  # fmt: skip
 
 
@@ -283,24 +245,60 @@ def _pair(rng: np.random.Generator) -> tuple[tuple[Flaw, float], ...]:
 
 
 def _judged(
-    block: Block, world: _Reality, planted: Sequence[tuple[Flaw, float]], seed: int, number: int
-) -> _Case:
+    block: Block, world: _Reality, planted: Sequence[tuple[Flaw, float]], seed: int
+) -> dict[str, Any]:
     clean, _ = simulated(block, (), seed)
     force, given = simulated(block, planted, seed)
     counted = world.model.presses.touching(world.recording.t)
-    measured = world.recording.force_on_tool[counted]
-
-    def rms(f: np.ndarray) -> float:
-        return float(np.sqrt((f**2).sum(axis=1).mean()))
-
-    sizes = {f.name: rms((simulated(block, [(f, x)], seed)[0] - clean)[counted]) for f, x in planted}
-    largest = max(sizes, key=lambda n: sizes[n], default="")
+    sizes = {f.name: rms_n((simulated(block, [(f, x)], seed)[0] - clean)[counted]) for f, x in planted}
+    largest = _largest(sizes)
     rest, _ = simulated(block, [(f, x) for f, x in planted if f.name != largest], seed)
-    salt = secrets.token_hex(16)
-    sealed = digest({"flaws": [[f.name, x] for f, x in planted]}, salt)
-    verdict = _verdict(world, Forces(block.t, force, "planted"), _stated(given))
-    left = rms(measured - rest[counted])
-    return _Case(number, tuple(planted), sizes, left, sealed, salt, verdict, world.late)
+    sealed = _sealed([[f.name, x] for f, x in planted])
+    stated = Stated(given.modulus_pa, given.poisson, given.friction, given.radius_m, frozenset(KEYS))
+    verdict = _verdict(world, Forces(block.t, force, "planted"), stated)
+    least = 0.02 * rms_n(verdict.simulated)
+    seen = max(_limits(verdict).get(largest, least), least)
+    left_n = rms_n((world.recording.force_on_tool - rest)[counted])
+    return _row(world, sealed, sizes, {f.name: [f.name] for f, _ in planted}, verdict, seen, left_n)
+
+
+def _largest(sizes: Mapping[str, float]) -> str:
+    """The flaw that changes the force most; '' for none."""
+    return max(sizes, key=lambda n: sizes[n], default="")
+
+
+def _limits(verdict: SimulatedGap) -> dict[str, float]:
+    return {e.name: e.detectable_n for e in verdict.entries if np.isfinite(e.detectable_n)}
+
+
+def _sealed(flaws: list[list[Any]]) -> dict[str, Any]:
+    truth, salt = {"flaws": flaws}, secrets.token_hex(16)
+    return {"truth": truth, "salt": salt, "sealed": digest(truth, salt)}
+
+
+def _row(
+    world: _Reality,
+    sealed: Mapping[str, Any],
+    sizes: Mapping[str, float],
+    right: Mapping[str, Sequence[str]],
+    verdict: SimulatedGap,
+    least_n: float,
+    left_n: float,
+) -> dict[str, Any]:
+    """sizes: by flaw the N rms by which it changes the force; right: the names that say it. least_n: what can
+    be seen of the largest; left_n: the gap without it."""
+    largest, named = _largest(sizes), _named(verdict)
+    at = [n for n in named if n in right.get(largest, ())]
+    known = {e.name: e.gap_after_n for e in verdict.entries}
+    return {
+        **sealed, "late_sensor": world.late, "sizes_n": sizes,
+        "times_visible": sizes[largest] / least_n if largest else 0.0, "left_n": left_n,
+        "kind": verdict.kind, "named": named, "candidates": list(verdict.candidates),
+        "reality": list(verdict.parts["reality"].names),
+        "shares": {name: part.share for name, part in verdict.parts.items()},
+        "said_left_n": known.get(at[0]) if at else None, "gap_n": verdict.gap_before_n,
+        "adds_up": _adds_up(verdict),
+    }  # fmt: skip
 
 
 def _verdict(world: _Reality, forces: Forces, stated: Stated, base: Forces | None = None) -> SimulatedGap:
@@ -319,26 +317,3 @@ def _named(verdict: SimulatedGap) -> list[str]:
 def _adds_up(verdict: SimulatedGap) -> bool:
     whole = sum(part.share for part in verdict.parts.values()) + verdict.unexplained
     return bool(abs(whole - 1) < 1e-9)
-
-
-def _stated(given: Given) -> Stated:
-    return Stated(given.modulus_pa, given.poisson, given.friction, given.radius_m, frozenset(KEYS))
-
-
-def _predicted(case: _Case) -> float | None:
-    """N, the gap that was said to be left once the largest flaw is mended."""
-    known = {e.name: e.gap_after_n for e in case.verdict.entries}
-    return known.get(case.truth[0]) if case.truth and case.truth[0] in case.named else None
-
-
-def _row(case: _Case) -> dict[str, Any]:
-    verdict = case.verdict
-    return {
-        "truth": {"flaws": [[f.name, x] for f, x in case.planted]}, "salt": case.salt, "sealed": case.sealed,
-        "late_sensor": case.late, "sizes_n": case.sizes, "times_visible": case.visible,
-        "left_n": case.left_n, "kind": verdict.kind, "named": case.named,
-        "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),
-        "shares": {name: part.share for name, part in verdict.parts.items()},
-        "said_left_n": _predicted(case), "gap_n": verdict.gap_before_n,
-        "adds_up": _adds_up(verdict),
-    }  # fmt: skip

@@ -24,15 +24,15 @@ from typing import Any
 import numpy as np
 
 from benchmarks._known_shapes import SHAPES
+from benchmarks._pressed_places import meshed
 from benchmarks.evidence import Figure
-from benchmarks.felt_surface import meshed
 from benchmarks.timing import table
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.progress import silent
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
-from palpate.render.options import DOCUMENTED, SETTINGS, RenderOptions
+from palpate.render.options import SETTINGS, RenderOptions
 from palpate.render.registry import create, simulator_names
 from palpate.render.replay import replay
 
@@ -87,13 +87,10 @@ class Case:
             found[-1] = -force[rests[-1]][0]
         closed = None if self.truth_n is None else [*self.truth_n, *([self.aside_n] if self.aside_m else [])]
         truth = np.array(next(each for each in (closed, own, found) if each is not None))
-        keep = slice(None, rests[len(self.depths_m) - 1] + 1)
-        down = self.top[2] + self.model.tool.tip_radius_m - centre[keep, 2]
         return {
             "what": [f"{1e3 * d:g} mm" for d in self.depths_m] + (["sideways"] if self.aside_m else []),
             "newtons": found.tolist(),
             "over": (found / truth).tolist(),
-            "curve": [(1e3 * down).tolist(), (force[keep] @ UP).tolist()],
             "samples": len(t),
         }
 
@@ -106,14 +103,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--recording", type=Path, help="whose presses are set beside the measured ones")
     parser.add_argument("--model", type=Path, help="its MODEL folder (default: reconstruct)")
     parser.add_argument("--presses", type=int, default=6, help="of the recording, over how many")
-    parser.add_argument("--page", type=Path, help="write a page with a curve for each case (HTML)")
     parser.add_argument("--work", type=Path, help="folder of presses that were run: they are shown, not run")
     parser.add_argument("--kept", action="store_true", help="run nothing, show what lies in --work")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Press with each; print newtons over truth and cost; return rows and figures."""
-    given = {name: getattr(arguments, name) for name in ("recording", "model", "page", "work")}
+    given = {name: getattr(arguments, name) for name in ("recording", "model", "work")}
     resolved = {name: None if path is None else path.resolve() for name, path in given.items()}
     kept = _Kept(resolved["work"])
     recorded = partial(_Recorded.of, resolved["recording"], resolved["model"], arguments.presses)
@@ -125,9 +121,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     rows = kept.in_order()
     header = ["case", "simulator", "settings", "newtons over truth", "cost [CPU s]"]
     print(table(header, [_said(row) for row in rows]))
-    if resolved["page"] is not None:
-        _write(rows, resolved["page"])
-    return {"rows": [{k: v for k, v in r.items() if k != "curve"} for r in rows], "figures": _figures(rows)}
+    return {"rows": rows, "figures": _figures(rows)}
 
 
 def _figures(rows: list[dict[str, Any]]) -> list[Figure]:
@@ -252,13 +246,10 @@ class _Recorded:
         truth = presses.net.push
         parts = [presses.parts[k] for k in chosen]
         peaks = [(float(push[p].max()), float(truth[p].max())) for p in parts]
-        deepest = max(parts, key=lambda p: presses.travel[p, 0].max())
-        until = slice(deepest.start, deepest.start + int(np.argmax(presses.travel[deepest, 0])) + 1)
         return {
             "what": ["median of peaks"],
             "newtons": [float(np.median([a for a, _ in peaks]))],
             "over": [float(np.median([a / b for a, b in peaks]))],
-            "curve": [(1e3 * presses.travel[until, 0]).tolist(), push[until].tolist(), truth[until].tolist()],
             "samples": int(sum(p.stop - p.start for p in parts)),
             "ended": [str(error) for error in errors.values()],
         }
@@ -276,45 +267,6 @@ def _said(row: dict[str, Any]) -> list[Any]:
         over += f"; {len(row['ended'])} presses ended without a force ({row['ended'][0]})"
     cost = "" if row["simulator"] == OURS else f"{row['cpu_s']:.3g}"
     return [row["case"], row["simulator"], row["settings"], over, cost]
-
-
-COLOURS = {"scikit-fem": "#2a9d8f", "mujoco": "#e76f51", "drake": "#1d3557", "newton": "#b8860b"}
-
-
-def _write(rows: list[dict[str, Any]], path: Path) -> None:
-    """A table, and the curves of every case."""
-    from palpate.show.page import Page, new_figure
-
-    page = Page("Simulators that press the same objects")
-    page.paragraph((__doc__ or "").split("\n\n", 1)[1])
-    for case in dict.fromkeys(row["case"] for row in rows):
-        own = [row for row in rows if row["case"] == case]
-        page.heading(case)
-        figure = new_figure(7, 3.6, layout="constrained")
-        _draw(figure.subplots(), [row for row in own if "curve" in row])
-        page.figure(
-            figure, "Force along the way in, and as it rests; dashed as documented, solid at its best."
-        )
-        page.table(
-            ["simulator", "settings", "newtons over truth", "cost [CPU s]"], [_said(r)[1:] for r in own]
-        )
-    page.write(path)
-
-
-def _draw(ax: Any, rows: list[dict[str, Any]]) -> None:
-    for row in rows:
-        depth, force, *measured = row["curve"]
-        if row["simulator"] == OURS:
-            if measured:
-                ax.plot(depth, measured[0], color="0.6", lw=3, label="measured")
-            ax.plot(depth, force, color="k", lw=2, label=OURS)
-            continue
-        style, name = "--" if row["settings"] == DOCUMENTED else "-", row["simulator"]
-        label = None if name in ax.get_legend_handles_labels()[1] else name
-        ax.plot(depth, force, style, lw=1.2, color=COLOURS[name], label=label)
-    ax.set(xlabel="depth [mm]", ylabel="force [N]", xlim=(0, None))
-    ax.legend(frameon=False, fontsize=8)
-    ax.spines[["top", "right"]].set_visible(False)
 
 
 def _model(mesh: TetMesh, radius_m: float, size_m: float) -> Model:

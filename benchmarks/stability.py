@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _stability_objects
-from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
+from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop, side_by_side
 from benchmarks._elastic_plane import ElasticPlane
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
@@ -104,23 +104,12 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     )
     for modulus, mass, impedance, rate, quantum, delay in grid:
         loop = Loop(rate, quantum, delay)
-        off = one(modulus, mass, impedance, loop, active=False)
-        on = one(modulus, mass, impedance, loop, active=True)
-        cases.append(
-            {
-                "young_modulus_pa": modulus,
-                "mass_kg": mass,
-                "damping_n_s_per_m": impedance[0],
-                "stiffness_n_per_m": impedance[1],
-                "rate_hz": rate,
-                "quantisation_m": quantum,
-                "delay_s": delay,
-                "given_back_unguarded_j": off.given_back_j,
-                "given_back_j": on.given_back_j,
-                "force_distortion": on.force_distortion,
-                "stiffness_lost": on.stiffness_lost,
-            }
-        )
+        off, on = (one(modulus, mass, impedance, loop, active=active) for active in (False, True))
+        about = {
+            "young_modulus_pa": modulus, "mass_kg": mass, "damping_n_s_per_m": impedance[0],
+            "stiffness_n_per_m": impedance[1], "rate_hz": rate, "quantisation_m": quantum, "delay_s": delay,
+        }  # fmt: skip
+        cases.append(side_by_side(off, on, **about))
     result: dict[str, Any] = {"aim_j": AIM_J, "cases": cases}
     by = ("delay_s", "rate_hz", "young_modulus_pa", "mass_kg", "stiffness_n_per_m", "quantisation_m")
     result["by"] = _report("pressed and tapped plane", cases, by)

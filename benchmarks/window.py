@@ -28,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=int, nargs=2, default=[1280, 800], metavar=("W", "H"), help="pixels")
     parser.add_argument("--beside", action=argparse.BooleanOptionalAction, default=True,
                         help="a second picture beside the first, as scenes have it")  # fmt: skip
-    parser.add_argument("--picture", metavar="PNG", help="save the window as it is in the press")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -63,8 +62,6 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             window.controls.press(down)
             _frames(window, arguments.frames // 3)  # until the tip is there
             found[name] = _frames(window, arguments.frames)
-        if arguments.picture:
-            window.plotter.screenshot(arguments.picture)
         found["parts"] = _parts(window, arguments.frames)
         found["drawn by"] = _card(window)
         window.plotter.close()

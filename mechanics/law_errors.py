@@ -140,10 +140,6 @@ class DepthLaw:
     common = OwnError(0.03, "1", "bend of the law of all places together", "all places", _EXPLORING)
     modulus = OwnError(0.03, "1", "force of a sample that a modulus is fitted to", "sample", _SET)
     field = OwnError(0.03, "1", "force of a sample, for a field or a comparison of models", "sample", _SET)
-    dent_depth = OwnError(
-        0.25, "1", "depth, in tip radii, at which the modulus of a dent is taken in a field", "place",
-        "chosen on slabs 1 to 3 of `palpate bench field`",
-    )  # fmt: skip
 
 
 class FiniteStrain:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks._known_shapes import SHAPES
-from benchmarks.felt_surface import meshed
+from benchmarks._pressed_places import meshed
 from palpate.mechanics.disk.writing import atomic_file
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.press_solver.graded_mesh import graded_mesh

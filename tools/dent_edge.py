@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 
 from benchmarks._known_shapes import KnownShape
 from benchmarks._more_shapes import EIGHT, thickness
-from benchmarks.felt_surface import meshed
+from benchmarks._pressed_places import meshed
 from palpate.mechanics.compliance.patch import usual_width
 from palpate.mechanics.compliance.sites import (
     LoadPatch,

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from palpate.diagnosis.compare.models import RIVALS, Fem, Prepared, predicted, prepare, rms
+from palpate.diagnosis.compare.models import RIVALS, Fem, Prepared, predicted, prepare
 from palpate.mechanics.compliance.smooth_field import SmoothField
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.model.model import Model
@@ -25,6 +25,7 @@ from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.result import Result
 from palpate.reconstruction.pipeline import ReconstructOptions, reconstruct_fully
 from palpate.reconstruction.presses_on_model import presses_on
+from palpate.render.replay import rms_n
 
 Predict = Callable[[np.ndarray, np.ndarray], tuple[dict[str, np.ndarray], Fem]]
 """(training presses, held-out presses) to each model's forces (rows of the held-out, 3), N, and the FEM."""
@@ -115,7 +116,7 @@ class Comparison(Result):
         fold = self.fold[presses.press]
         total, count = np.bincount(fold, weights=push), np.bincount(fold)
         others = (push.sum() - total) / np.maximum(len(push) - count, 1)
-        return rms(others[fold, None] * normal - presses.force)
+        return rms_n(others[fold, None] * normal - presses.force)
 
     @property
     def normal_rmse_n(self) -> dict[str, float]:
@@ -179,13 +180,14 @@ def compare_presses(
     held_out = tuple(_by_region(presses, model, predict, part(progress, 0.7, 1.0)))
     error = {m: forces[m] - presses.force for m in forces}
     each = {
-        m: np.array([rms(error[m][presses.rows(np.array([i]))]) for i in range(len(presses))]) for m in error
+        m: np.array([rms_n(error[m][presses.rows(np.array([i]))]) for i in range(len(presses))])
+        for m in error
     }
     return Comparison(
         prepared=prepared,
         model=model,
-        rmse_n={m: rms(error[m]) for m in error},
-        relative_rmse={m: rms(error[m]) / rms(presses.force) for m in error},
+        rmse_n={m: rms_n(error[m]) for m in error},
+        relative_rmse={m: rms_n(error[m]) / rms_n(presses.force) for m in error},
         press_rmse_n=each,
         fold=fold,
         moduli_pa=np.array([fem.modulus_pa for fem in fitted]),
@@ -241,8 +243,8 @@ def _by_region(presses: Presses, model: Model, predict: Predict, progress: Progr
         held = np.flatnonzero(region.members)
         forces, _ = predict(np.flatnonzero(~region.members), held)
         measured = presses.force[presses.rows(held)]
-        error = {m: rms(f - measured) for m, f in forces.items()}
-        relative = {m: e / rms(measured) for m, e in error.items()}
+        error = {m: rms_n(f - measured) for m, f in forces.items()}
+        relative = {m: e / rms_n(measured) for m, e in error.items()}
         bias = {m: float((f * measured).sum() / (measured**2).sum() - 1) for m, f in forces.items()}
         made.append(RegionResult(region, error, relative, bias))
     return made

@@ -40,6 +40,7 @@ from palpate.reconstruction.steps.s7_modulus.modulus_field import (
     with_field,
 )
 from palpate.reconstruction.steps.s7_modulus.press_fit import touched_by_law
+from palpate.render.replay import rms_n
 
 HOMOGENEOUS = "fem-homogeneous"
 MODELS = ("fem", *RIVALS, HOMOGENEOUS)
@@ -145,7 +146,7 @@ def _homogeneous(prepared: Prepared, train: np.ndarray) -> Fem:
     fits = []
     for law, unit in prepared.unit.items():
         modulus = _scale(unit[seen], measured)
-        fits.append((rms(modulus * unit[seen] - measured), modulus, law))
+        fits.append((rms_n(modulus * unit[seen] - measured), modulus, law))
     _, modulus, law = min(fits)
     return Fem(law, modulus, with_field(prepared.sites, prepared.places, None))
 
@@ -208,11 +209,6 @@ def as_touched(force: Callable[[np.ndarray], np.ndarray], presses: Presses, firs
 
 def _scale(unit: np.ndarray, measured: np.ndarray) -> float:
     return float((unit * measured).sum() / (unit**2).sum())
-
-
-def rms(forces: np.ndarray) -> float:
-    """Of 3-vectors (n, 3)."""
-    return float(np.sqrt((forces**2).sum(axis=1).mean()))
 
 
 def stiffness_along(

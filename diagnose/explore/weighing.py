@@ -47,6 +47,7 @@ from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.statistics import squared_exponential
 from palpate.reconstruction.steps.s5_mesh.meshing import uncertainty_at
+from palpate.render.replay import rms_n
 
 Act = Callable[[ForwardSettings, Forward], None]
 """Sets one form of a cause in a prediction."""
@@ -245,8 +246,7 @@ def changed(forward: Forward, found: Fit, act: Act | None) -> np.ndarray:
 
 
 def _size(change: np.ndarray, plain: np.ndarray) -> float:
-    beyond = change - modulus_share(change, plain) * plain
-    return float(np.sqrt((beyond**2).sum(axis=1).mean()))
+    return rms_n(change - modulus_share(change, plain) * plain)
 
 
 def forward_of(estimate: ExplorationEstimate) -> tuple[Forward, np.ndarray] | None:

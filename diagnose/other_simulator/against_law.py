@@ -31,6 +31,7 @@ from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.law_errors import DepthLaw, FirstTouch, Level, Repeats, Smallest, Stiffness, Unnamed
 from palpate.mechanics.presses.table import Noise
 from palpate.mechanics.progress import Progress, silent
+from palpate.render.replay import rms_n
 
 LEAST_SHARE = Smallest.simulator.value
 """Of the typical force, below which a numerical effect is not named: our own law is no better everywhere."""
@@ -126,7 +127,7 @@ def numerics_of(
         )
         gain[name] = score.gain
     left = float(best.chi)
-    missed = float(np.sqrt((best.residual[t.counted] ** 2).sum(axis=1).mean()))
+    missed = rms_n(best.residual[t.counted])
     remainder = left > rules.unknown_chi and missed > LEAST_SHARE * typical
     reasons = [
         f"{n.replace('_', ' ')}: within the {100 * COMMON_ERROR:.0f} % that our own law may be off "
@@ -162,7 +163,7 @@ def _limits(search: Search, found: Attribution, tried: Sequence[Effect]) -> dict
             settings = settings_of(forward, base.effects, base.values, base.onset)
             effect.act(settings, moved, forward)
             change = np.nan_to_num(forward.predict(settings)) - before
-            size = np.sqrt((change[forward.touches.counted] ** 2).sum(axis=1).mean())
+            size = rms_n(change[forward.touches.counted])
             seen = np.sqrt(search.whitener.gram(change[:, :, None]).sum())
             shown.append(float(size * SEEN / max(seen, 1e-12)))
         limits[effect.name] = min(shown)

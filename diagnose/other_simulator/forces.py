@@ -20,6 +20,7 @@ from palpate.mechanics.options import option
 from palpate.mechanics.plausible import COLUMN
 from palpate.mechanics.presses.table import LEAD_S, Presses
 from palpate.mechanics.quantities import parse_unit
+from palpate.render.replay import rms_n
 
 
 def spread_out(presses: Presses, most: int | None) -> np.ndarray:
@@ -182,7 +183,7 @@ def reading_error_n(step: float, presses: Presses) -> float:
 def _too_coarse(step: float, presses: Presses) -> str:
     """That rows so far apart change the force by as much as flaws differ by, in words; '' where not."""
     net = (presses.force - presses.free_air)[presses.counted]
-    least = COARSE * Smallest.simulator.value * float(np.sqrt((net**2).sum(axis=1).mean()))
+    least = COARSE * Smallest.simulator.value * rms_n(net)
     error = reading_error_n(step, presses)
     if error <= least:
         return ""

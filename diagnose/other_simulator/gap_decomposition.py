@@ -39,6 +39,7 @@ from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
 from palpate.mechanics.effects.poisson_ratio import EFFECT as POISSON
 from palpate.mechanics.effects.tip_radius import EFFECT as TIP
+from palpate.render.replay import rms_n
 
 
 def sizes_alone(
@@ -249,8 +250,7 @@ def wrong_parameters(
                 change = law * (modulus / was - 1)[:, None]
             else:
                 change = law_at(forward, current.but(key, now), numerics) - law
-            counted = change[weighing.group >= 0]
-            if np.sqrt((counted**2).sum(axis=1).mean()) < least:
+            if rms_n(change[weighing.group >= 0]) < least:
                 continue
             before, after = weighing.squares(gap), weighing.squares(gap - change)
             if lower_closure(before, after, weighing.counts, noise, least**2, rules.doubt) <= 0:

@@ -55,7 +55,7 @@ class Elastic:
     """modulus_pa: median, with its 95 % interval, of all hypotheses. yields: probability of a machine that
     yields; stiffness_n_per_m, share: of it, median (nan where none is likely), with the stiffness's 95 %;
     rigid_pa, yielding_pa: the modulus by either. sloped: probability that free air slopes; slope_n_per_m (c,)
-    of each curve given, mean of all, and its standard error. law: the likeliest. laws: probability of each.
+    of each curve given, mean of all. law: the likeliest. laws: probability of each.
     missed: rms of blocks of force that were left out by the likeliest, over that of the force; rigid_missed:
     by the best on a rigid machine. along_m, along_n: (k,) travel m, of dent and machine, and force N of the
     likeliest; touch_m: where the first curve touches, after what was told."""
@@ -70,7 +70,6 @@ class Elastic:
     yielding_pa: float
     sloped: float
     slope_n_per_m: np.ndarray
-    slope_error_n_per_m: np.ndarray
     law: str
     laws: dict[str, float]
     missed: float
@@ -168,7 +167,7 @@ def _along(fits: Sequence[WayFit], shares: np.ndarray) -> list[_Row]:
 @dataclass(frozen=True)
 class _Table:
     """One hypothesis over (n,) shares and differences between curves: log of its weight, with how often such
-    a one comes; log E and its standard error; slope N/m of each way (w,), its standard error."""
+    a one comes; log E and its standard error; slope N/m of each way (w,)."""
 
     law: str
     share: np.ndarray
@@ -176,7 +175,6 @@ class _Table:
     log_e: np.ndarray
     error: np.ndarray
     slope: np.ndarray | None = None
-    slope_error: np.ndarray | None = None
 
 
 def _weighed(tried: Sequence[_Tried], every: np.ndarray, curves: int) -> Elastic:
@@ -202,15 +200,11 @@ def _weighed(tried: Sequence[_Tried], every: np.ndarray, curves: int) -> Elastic
     weight = np.concatenate(weights)
     low, middle, high = _quantiles(log_e, error, weight)
     laws: dict[str, float] = {}
-    slope, square, sloped = np.zeros(len(every)), np.zeros(len(every)), 0.0
+    slope, sloped = np.zeros(len(every)), 0.0
     for table, w in zip(tables, weights, strict=True):
         laws[table.law] = laws.get(table.law, 0.0) + float(w.sum())
-        if table.slope is not None and table.slope_error is not None:
-            slope = slope + w.sum() * table.slope
-            square, sloped = (
-                square + w.sum() * (table.slope**2 + table.slope_error**2),
-                sloped + float(w.sum()),
-            )
+        if table.slope is not None:
+            slope, sloped = slope + w.sum() * table.slope, sloped + float(w.sum())
     yields = share > 0
     chance, nan = float(weight[yields].sum()), float("nan")
     taken: list[float] = [nan, nan, nan]
@@ -235,7 +229,6 @@ def _weighed(tried: Sequence[_Tried], every: np.ndarray, curves: int) -> Elastic
         yielding_pa=yielding,
         sloped=sloped,
         slope_n_per_m=slope[near],
-        slope_error_n_per_m=np.sqrt(np.maximum(square - slope**2, 0.0))[near],
         law=law,
         laws=laws,
         missed=_missed(mine.fits, mine.best),
@@ -272,10 +265,10 @@ def _marginal(each: _Tried, alike: bool | None, often: float, variance: float) -
         pulls = np.array([[one.values[-1] for one in row] for _, row in each.rows])
         prior = -0.5 * (pulls / _PULLS) ** 2 - np.log(_PULLS * np.sqrt(2 * np.pi))
         of_rows[:, 0] += prior.sum(axis=1)[:, None]
-    slope = _slopes(each, variance)
+    slope = _slopes(each)
     if len(shares) == 1:
         log, log_e, error = of_rows[0]
-        return _Table(law, np.zeros(len(apart)), log, log_e, error, *slope)
+        return _Table(law, np.zeros(len(apart)), log, log_e, error, slope)
     fine = np.linspace(0.0, shares[-1], _FINE)
     likely = PchipInterpolator(shares, of_rows[:, 0].max(axis=1))(fine)
     near = fine[likely > likely.max() - _UNLIKELY]
@@ -287,7 +280,7 @@ def _marginal(each: _Tried, alike: bool | None, often: float, variance: float) -
     of_rows[:1, 0] += np.log(_RIGID)
     log, log_e, error = np.moveaxis(np.concatenate([of_rows[:1], between]), 1, 0)
     at = np.repeat(np.append(0.0, fine), len(apart))
-    return _Table(law, at, log.ravel(), log_e.ravel(), error.ravel(), *slope)
+    return _Table(law, at, log.ravel(), log_e.ravel(), error.ravel(), slope)
 
 
 def _of_row(row: Sequence[WayFitted], alike: bool | None, variance: float, apart: np.ndarray) -> np.ndarray:
@@ -321,15 +314,12 @@ def _of_row(row: Sequence[WayFitted], alike: bool | None, variance: float, apart
     return found
 
 
-def _slopes(each: _Tried, variance: float) -> tuple[np.ndarray, np.ndarray] | tuple[()]:
-    """N/m of each way and their standard errors, at the share that leaves least; nothing of flat air."""
+def _slopes(each: _Tried) -> np.ndarray | None:
+    """N/m of each way, at the share that leaves least; None of flat air."""
     fit = each.fits[0]
     if not fit.sloped:
-        return ()
-    unit = fit.peak / fit.deep
-    values = np.array([one.values[2] for one in each.best[1]])
-    square = np.array([variance * one.covariance[2, 2] for one in each.best[1]])
-    return unit * values, unit * np.sqrt(square)
+        return None
+    return fit.peak / fit.deep * np.array([one.values[2] for one in each.best[1]])
 
 
 def _quantiles(middle: np.ndarray, error: np.ndarray, weight: np.ndarray) -> list[float]:

@@ -161,7 +161,7 @@ EFFECT = Effect(
         seek=_seek,
         any_form=True,
         expensive=True,
-        # first order in the far field: on four slabs of 'palpate bench field' the contrast was 0.82 to 0.99
+        # first order in the far field: on four slabs of `benchmarks._tissue` the contrast was 0.82 to 0.99
         systematic_share=(0.13,) * MODES,
     ),
 )

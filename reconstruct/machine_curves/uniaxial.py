@@ -1,6 +1,4 @@
-"""Uniaxial compression of cylinders between platens: Instron exports.
-
-Uniaxial tests of elastomers, in tension or compression: which law of stress over stretch predicts curves
+"""Uniaxial tests of elastomers, in tension or compression: which law of stress over stretch predicts curves
 that it has not seen.
 
 Stress is force over the first area (engineering), stretch is length over first length, below 1 in
@@ -19,50 +17,6 @@ from scipy.interpolate import PchipInterpolator
 
 from palpate.mechanics.disk.reading import reading
 from palpate.mechanics.errors import RecordingError
-
-
-@dataclass(frozen=True)
-class Compression:
-    """Loading of a cylinder: strain (n,) engineering, positive in compression; stress (n,) Pa, force over the
-    first area."""
-
-    strain: np.ndarray
-    stress: np.ndarray
-    diameter_m: float
-    height_m: float
-
-
-def read_compression(path: Path | str) -> Compression:
-    """Read one test: `key: value;` lines with the cylinder's diameter and height in mm, then comma-separated
-    samples.
-
-    Stress comes from load over area, not from the file's own stress column, whose unit its documentation and
-    its header disagree about. Raises RecordingError where a line or column is missing.
-    """
-    path = Path(path)
-    lines, start = exported(path)
-    sizes = {}
-    for key, _, value in (line.partition(":") for line in lines[:start]):
-        if key.startswith("Cylinder "):
-            sizes[key.split()[1]] = float("".join(c for c in value if c.isdigit() or c == ".")) / 1e3
-    if len(sizes) < 2:
-        raise RecordingError(f"'{path}' does not state the cylinder's diameter and height")
-    separator = ";" if lines[start].count(";") > lines[start].count(",") else ","
-    names = [name.strip().lower() for name in lines[start].split(separator)]
-    wanted = [next((i for i, n in enumerate(names) if n.startswith(w)), -1) for w in ("compression", "load")]
-    if min(wanted) < 0:
-        raise RecordingError(
-            f"'{path}' needs the columns Compression (mm) and Load (N); it has {', '.join(names)}"
-        )
-    rows = [line.split(separator) for line in lines[start + 1 :] if line.strip(" ;,")]
-    try:
-        compression, load = (np.array([float(row[i]) for row in rows]) for i in wanted)
-    except (ValueError, IndexError) as error:
-        raise RecordingError(f"'{path}' has a row that is no numbers: {error}") from error
-    area = np.pi * sizes["Diameter"] ** 2 / 4
-    return Compression(
-        np.abs(compression) / 1e3 / sizes["Height"], np.abs(load) / area, sizes["Diameter"], sizes["Height"]
-    )
 
 
 def exported(path: Path) -> tuple[list[str], int]:
@@ -109,10 +63,36 @@ class Uniaxial:
         return Uniaxial(1 + sign * at, stress, self.name, self.specimen)
 
 
-def of_compression(path: Path | str, specimen: str = "") -> Uniaxial:
-    """A cylinder between platens."""
-    test = read_compression(path)
-    return Uniaxial(1 - test.strain, -test.stress, Path(path).stem, specimen)
+def read_compression(path: Path | str, specimen: str = "") -> Uniaxial:
+    """A cylinder between platens: `key: value;` lines with its diameter and height in mm, then
+    comma-separated samples.
+
+    Stress comes from load over area, not from the file's own stress column, whose unit its documentation and
+    its header disagree about. Raises RecordingError where a line or column is missing.
+    """
+    path = Path(path)
+    lines, start = exported(path)
+    sizes = {}
+    for key, _, value in (line.partition(":") for line in lines[:start]):
+        if key.startswith("Cylinder "):
+            sizes[key.split()[1]] = float("".join(c for c in value if c.isdigit() or c == ".")) / 1e3
+    if len(sizes) < 2:
+        raise RecordingError(f"'{path}' does not state the cylinder's diameter and height")
+    separator = ";" if lines[start].count(";") > lines[start].count(",") else ","
+    names = [name.strip().lower() for name in lines[start].split(separator)]
+    wanted = [next((i for i, n in enumerate(names) if n.startswith(w)), -1) for w in ("compression", "load")]
+    if min(wanted) < 0:
+        raise RecordingError(
+            f"'{path}' needs the columns Compression (mm) and Load (N); it has {', '.join(names)}"
+        )
+    rows = [line.split(separator) for line in lines[start + 1 :] if line.strip(" ;,")]
+    try:
+        compression, load = (np.array([float(row[i]) for row in rows]) for i in wanted)
+    except (ValueError, IndexError) as error:
+        raise RecordingError(f"'{path}' has a row that is no numbers: {error}") from error
+    area = np.pi * sizes["Diameter"] ** 2 / 4
+    strain = np.abs(compression) / 1e3 / sizes["Height"]
+    return Uniaxial(1 - strain, -(np.abs(load) / area), path.stem, specimen)
 
 
 def read_tension(path: Path | str) -> Uniaxial:

@@ -13,12 +13,13 @@ from palpate.importing.clocks import PARTS, POINTS_HZ, Stream, one_clock, slower
 from palpate.importing.frames import framed, is_on_tool, one_axis, tared
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import MOST_ODDS, Unclear, best
-from palpate.importing.pace import too_quick
 from palpate.importing.tables import Table
 from palpate.importing.units import SI
 from palpate.mechanics.errors import RecordingError
-from palpate.mechanics.plausible import COLUMN
+from palpate.mechanics.plausible import COLUMN, EXPLORATION
 from palpate.mechanics.recording.recording import Recording
+from palpate.reconstruction.checks.samples import Samples
+from palpate.reconstruction.checks.units import measured
 
 
 @dataclass(frozen=True)
@@ -162,3 +163,33 @@ def _description(said: Said, quasi_static: bool, read_hz: float | None) -> dict[
     tool = {} if said.tip is None else {"tip": said.tip}
     told = {} if said.force_on is None else {"force_on": said.force_on}
     return {"recording": about, "tool": tool, "object": dict(said.thing), "import": told}
+
+
+_OFF = (10.0, 100.0)
+"""Factors by which a rate is mistaken upwards; a machine may go as slowly as it likes."""
+_SEEN = ("speed", "touch")
+
+
+def too_quick(recording: Recording) -> str:
+    """A warning, which asks for another rate, where no hand is so quick as the stated one makes it; else ''.
+
+    Both quantities are log-normal (`EXPLORATION`); the rate is doubted where a lower one is far likelier.
+    """
+    seen = {name: value for name, value in measured(Samples(recording)).items() if name in _SEEN}
+    scores: dict[tuple[int, ...], float] = {
+        (round(by),): sum(
+            -0.5 * EXPLORATION[k].off(v, EXPLORATION[k].powers[0] * -float(np.log(by))) ** 2
+            for k, v in seen.items()
+        )
+        for by in (1.0, *_OFF)
+    }
+    reading = best(scores)
+    if reading.value == (1,) or not reading.sure:
+        return ""
+    rate = recording.sample_rate_hz / reading.value[0]
+    told = " and ".join(
+        f"a {EXPLORATION[k].words} of {v:.2g}, where {EXPLORATION[k].usual:.2g} is usual"
+        for k, v in seen.items()
+    )
+    given = f"WARNING: rows at {recording.sample_rate_hz:g} Hz give {told}"
+    return f"{given}: is it {rate:g} Hz? say --rate {rate:g}"

@@ -25,7 +25,7 @@ from palpate.importing.tip_form import sphere_or_ask
 from palpate.mechanics.contact.tip import POINTED, WORDS, Tip
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.reconstruction.machine_curves.indentation import read_chiaro
-from palpate.reconstruction.machine_curves.uniaxial import of_compression, read_tension
+from palpate.reconstruction.machine_curves.uniaxial import read_compression, read_tension
 from palpate.words import mm
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
@@ -55,7 +55,7 @@ def read_tests(
             "files of one kind"
         )
     if test_of[0] == "compression":
-        return MachineTests("compression", tests=tuple(of_compression(p, _specimen(p)) for p in paths))
+        return MachineTests("compression", tests=tuple(read_compression(p, _specimen(p)) for p in paths))
     if test_of[0] == "tension":
         return MachineTests("tension", tests=tuple(map(read_tension, paths)))
     if test_of[0] == "relaxation":

@@ -8,8 +8,7 @@ from argparse import Namespace
 import numpy as np
 import pytest
 
-from benchmarks.diagnose_real import FOLDERS, SETS, _row
-from benchmarks.tissue_laws import pieces_of
+from benchmarks.diagnose_real import FOLDERS, SETS, _row, pieces_of
 from palpate.mechanics.effects.registry import effect
 
 

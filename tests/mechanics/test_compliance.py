@@ -1,11 +1,10 @@
-"""Condensed compliance: equal to full solves, symmetric, positive definite; the servo's tables."""
+"""The servo's tables, and the solver behind them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from benchmarks._condensation import condense
 from palpate.mechanics.compliance import stored_compliance
 from palpate.mechanics.compliance.sites import LoadPatch, touch_sites
 from palpate.mechanics.compliance.surface_compliance import patch_blocks, surface_compliance
@@ -15,44 +14,16 @@ from palpate.mechanics.errors import MeshError, OptionError
 from palpate.mechanics.shape.nearest import closest
 from palpate.mechanics.shape.tetmesh import TetMesh
 
-WAYS = [("columns", "superlu", 0)]
-if available():  # schur: all at once for a small result, in two parts for a large one
-    WAYS += [("columns", "pardiso", 0), ("schur", None, 1e8), ("schur", None, 0)]
 
-
-@pytest.mark.parametrize(("method", "backend", "small"), WAYS)
-def test_condensed_equals_full_solves(box, monkeypatch, method, backend, small):
-    monkeypatch.setattr("benchmarks._condensation._SMALL", small)
-    mesh = box((3, 3, 2), (0.1, 0.1, 0.05)).quadratic()
-    ratio = np.random.default_rng(0).uniform(0.5, 6, len(mesh.tetrahedra))
-    compliance = condense(mesh, 0.49, ratio, method=method, backend=backend)
-    c = compliance.matrix
-    assert len(compliance.nodes) == mesh.touchable.sum()
-    assert np.abs(c - c.T).max() <= 1e-10 * np.abs(c).max()
-    assert np.linalg.eigvalsh(c).min() > 0
-    solver = Solver(mesh, 0.49, ratio, backend="superlu")
-    for column in (0, 40, len(c) - 1):
-        force = np.zeros_like(mesh.points)
-        force[compliance.nodes[column // 3], column % 3] = 1
-        u = solver.solve(force)[compliance.nodes].ravel()
-        assert np.abs(u - c[:, column]).max() < 1e-8 * np.abs(u).max()
-
-
-def test_unknown_ways_are_refused(box):
+def test_an_unknown_backend_is_refused(box):
     mesh = box((2, 2, 2), (0.1, 0.1, 0.05))
-    with pytest.raises(OptionError, match="schur, columns"):
-        condense(mesh, 0.4, method="sparse")
     with pytest.raises(OptionError, match="pardiso, superlu"):
         Solver(mesh, 0.4, backend="cholmod")
 
 
-def test_nothing_to_touch_or_nothing_held_is_refused(box):
+def test_a_mesh_that_nothing_holds_is_refused(box):
     mesh = box((2, 2, 2), (0.1, 0.1, 0.05))
     nobody = np.zeros(len(mesh.points), dtype=bool)
-    with pytest.raises(MeshError, match="no touchable node"):
-        condense(TetMesh(mesh.points, mesh.tetrahedra, mesh.fixed, nobody), 0.4)
-    with pytest.raises(MeshError, match="rigid body"):
-        condense(TetMesh(mesh.points, mesh.tetrahedra, nobody, mesh.touchable), 0.4)
     with pytest.raises(MeshError, match="rigid body"):
         Solver(TetMesh(mesh.points, mesh.tetrahedra, nobody, mesh.touchable), 0.4)
 

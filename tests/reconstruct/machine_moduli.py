@@ -11,18 +11,19 @@ from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.errors import ContactError, RecordingError
 from palpate.mechanics.statistics import spread_about_zero
 from palpate.reconstruction.machine_curves.indentation import Indentation
-from palpate.reconstruction.machine_curves.uniaxial import Compression
+from palpate.reconstruction.machine_curves.uniaxial import Uniaxial
 
 
-def small_strain_modulus(test: Compression, *, low: float = 0.0, high: float = 0.05) -> float:
+def small_strain_modulus(test: Uniaxial, *, low: float = 0.0, high: float = 0.05) -> float:
     """Slope (Pa) of a straight line through stress over strain between two strains.
 
     It is Young's modulus only where the platens let the faces slide; bonded faces raise it.
     """
-    used = (test.strain >= low) & (test.strain <= high)
+    strain = 1 - test.stretch
+    used = (strain >= low) & (strain <= high)
     if used.sum() < 3:
         raise RecordingError(f"fewer than 3 samples lie between the strains {low} and {high}")
-    return float(np.polyfit(test.strain[used], test.stress[used], 1)[0])
+    return float(np.polyfit(strain[used], -test.stress[used], 1)[0])
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from palpate.mechanics.compliance.smooth_field import (
     Shares,
     SmoothField,
     Views,
-    correlation,
     estimate,
     lengths_of,
     places_of,
@@ -51,9 +50,6 @@ REFITS = 1
 LAW_ERROR = DepthLaw.field.value
 LEVEL_BIAS = Level.field.value
 """Standard error of the level that no press tells: law and mesh, as of a global modulus."""
-DENT_DEPTH_SD = DepthLaw.dent_depth.value
-"""In tip radii: a dent feels a volume, of which no press tells how deep its middle lies; standard deviation
-from the depth at which its modulus is taken (mechanics.compliance.smooth_field)."""
 
 
 @dataclass(frozen=True)
@@ -138,15 +134,6 @@ def asked_for(found: FieldEstimate | None) -> bool:
         and found.explained > LEAST_EXPLAINED
         and found.felt > LEAST_FELT
     )
-
-
-def map_sd(found: FieldEstimate, tip_radius_m: float) -> np.ndarray:
-    """(c,) standard deviation of ln E at a field's places: the estimate's, the level's that no press tells,
-    and that of the depth at which a dent feels."""
-    apart = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, DENT_DEPTH_SD * tip_radius_m]])
-    alike = correlation(apart, apart, found.prior.length_m)[0, 1]
-    deep = found.prior.log_sd**2 * 2 * (1 - alike)
-    return np.sqrt(found.sd**2 + LEVEL_BIAS**2 + deep)
 
 
 @dataclass(frozen=True)

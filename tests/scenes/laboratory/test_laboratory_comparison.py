@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks._laboratory_comparison import SHARES, Press, by_depth, cylinder_shape, recorded_presses
+from benchmarks.laboratory import SHARES, Press, by_depth, cylinder_shape, recorded_presses
 from palpate.scenes.laboratory.simulate import SimulateOptions, simulate
 from palpate.scenes.phantoms import phantom
 

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.felt_surface import forces
+from benchmarks._pressed_places import forces
 from tests.render.test_true_shape import FILLET, HEIGHT, RADIUS, filleted, meshed
 
 
