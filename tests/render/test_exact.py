@@ -120,3 +120,13 @@ def test_the_command_says_law_solution_and_bound(block_folder, kept, monkeypatch
     assert len(own["depth_m"]) == len(own["law_n"]) == len(own["solved_n"]) == len(own["force_error_n"]) == 6
     assert main([*place, "--renderer", "kelvin-voigt"]) == 2
     assert "'fem'" in capsys.readouterr().err
+
+
+def test_a_place_says_how_far_it_is_solved(exact):
+    """A bar stood at nothing for a minute."""
+    told = []
+    up = np.array([0.0, 0.0, 1.0])
+    exact(np.array([0.005, 0.0, 0.08]), up, 1e-3, lambda stage, share: told.append((stage, share)))
+    shares = [share for _, share in told]
+    assert len(set(shares)) > 3 and shares == sorted(shares) and 0 <= shares[0] and shares[-1] <= 1
+    assert all("1 mm" in stage for stage, _ in told)
