@@ -310,8 +310,10 @@ def file_text(name: str) -> str:
 
 
 NO_BREAK = "\u00a0"
-_UNIT = re.compile(r"(?<=\d) (?=(?:[mkMG]?(?:N|Pa|Hz)|[mcµ]?m|[mµ]?s|m?N/mm?)\b)(?=[^`]*(?:`[^`]*`[^`]*)*$)")
-"""The space between a number and its unit, outside of what is marked as code."""
+_UNIT = re.compile(
+    r"(?<=\d) (?=(?:[mkMG]?(?:N|Pa|Hz)|[mcµ]?m|[mµ]?s|m?N/mm?)\b|%)(?=[^`]*(?:`[^`]*`[^`]*)*$)"
+)
+"""The space between a number and its unit or per cent sign, outside of what is marked as code."""
 
 
 def _words(text: str) -> str:
