@@ -170,7 +170,7 @@ def simulate(
     unlabelled = dataclasses.replace(result, recording=read_recording(path))
     call.following = [
         partial(next_lines, unlabelled),
-        "      with a verdict, see what was sealed, and that nobody changed it (no command compares the two):",
+        "      with a verdict, see what was sealed, and that nobody changed it (no command compares them):",
         f'      python -c "{opening}"',
     ]
     sealed: Any = _Sealed(result, path)
