@@ -79,12 +79,14 @@ class ExactPlaces:
             tip_radius_m=self.tip_m * touch.tip_ratio, options=self.options,
         )  # fmt: skip
 
-    def __call__(self, point: np.ndarray, normal: np.ndarray, deepest_m: float) -> SolvedPlace | None:
+    def __call__(
+        self, point: np.ndarray, normal: np.ndarray, deepest_m: float, progress: Progress = silent
+    ) -> SolvedPlace | None:
         """The place at `point` (3,) m with its outward normal (3,), pressed to `deepest_m`; None where the
         solver finds no equilibrium or the law gives no force."""
         depths = self._presses.depths(deepest_m)
         modulus = self.renderer.model.material.young_modulus_pa
-        solved = modulus * self._presses.normal_force(point, normal, depths)
+        solved = modulus * self._presses.normal_force(point, normal, depths, progress)
         law, error = self._law(point, normal, depths)
         good = np.isfinite(solved) & (law > 0)
         if good.sum() < 2:

@@ -19,6 +19,7 @@ from palpate.mechanics.disk.reading import read_text
 from palpate.mechanics.disk.writing import Kind, atomic_file
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.plausible import TIP_RADIUS
+from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.result import Result
 from palpate.render.base import Renderer
 from palpate.render.force_error import error_figures, force_errors
@@ -227,9 +228,9 @@ def check_start(scene: TouchScene, start: np.ndarray, touch: np.ndarray, radius:
         )
 
 
-def solved(curve: Curve, exact: ExactPlaces) -> Curve:
+def solved(curve: Curve, exact: ExactPlaces, progress: Progress = silent) -> Curve:
     """The curve with its place solved. Raises OptionError where the solver finds no equilibrium there."""
-    place = exact(curve.touched_at, np.asarray(curve.normal), float(curve.depth.max()))
+    place = exact(curve.touched_at, np.asarray(curve.normal), float(curve.depth.max()), progress)
     if place is None:
         raise OptionError(
             "this press cannot be solved (no equilibrium, or it meets the support): press less deep, or "

@@ -10,7 +10,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 
@@ -46,10 +46,16 @@ def listen(handler: Any) -> dict[int, Any]:
 
 
 @contextlib.contextmanager
-def loaded_whole() -> Iterator[None]:
-    """Ctrl-C and requests to end wait until what is loaded here is there; then they are answered."""
+def loaded_whole(heard: Callable[[], object] = lambda: None) -> Iterator[None]:
+    """Ctrl-C and requests to end wait until what is loaded here is there; then they are answered. heard: ends
+    what is done here where it goes on until it is ended, as a library's loop that forgets exceptions."""
     came: list[int] = []
-    before = listen(lambda number, frame: came.append(number))
+
+    def hear(number: int, frame: Any) -> None:
+        came.append(number)
+        heard()
+
+    before = listen(hear)
     try:
         yield
     finally:

@@ -196,7 +196,9 @@ def chance_words(p: float) -> str:
     """A p value as one would say it."""
     if p < 0.0095:
         return "less than once in 100"
-    return f"{100 * p:.0f} times in 100" if p < 0.995 else "always"
+    if p < 0.995:
+        return f"{100 * p:.0f} times in 100" if p >= 0.015 else "once in 100"
+    return "always"
 
 
 def share_words(value: float | None) -> str:

@@ -11,6 +11,7 @@ from palpate.mechanics.press_solver.body import BodyMaterial, PressedBody
 from palpate.mechanics.press_solver.contact import PressContact
 from palpate.mechanics.press_solver.equilibrium import PressPath, Settling
 from palpate.mechanics.press_solver.graded_mesh import CurvedSurface, drawn_to, graded_mesh
+from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 _LONGEST = 1.3
@@ -100,7 +101,12 @@ class PressSolver:
         return point if self._surface is None else self._surface.nearest(point)[0]
 
     def press(
-        self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, slide: np.ndarray | None = None
+        self,
+        point: np.ndarray,
+        normal: np.ndarray,
+        depths: np.ndarray,
+        slide: np.ndarray | None = None,
+        progress: Progress = silent,
     ) -> PressSolution:
         """Press at `point` (3,) m against the outward normal (3,) to `depths` (k,) m, then move the tip.
 
@@ -119,6 +125,9 @@ class PressSolver:
         count, scale = len(centres), self.young_modulus_pa
         force, radius, energy = np.full((count, 3), np.nan), np.full(count, np.nan), np.full(count, np.nan)
         for k, centre in enumerate(centres):
+            progress(
+                f"solving {1e3 * depths[min(k, len(depths) - 1)]:.2g} of {1e3 * depths[-1]:.2g} mm", k / count
+            )
             if not self._driven(path, start, centre):
                 break
             force[k], energy[k] = scale * path.state.force, scale * path.state.energy

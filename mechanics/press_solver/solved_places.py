@@ -93,11 +93,17 @@ class SolvedPresses:
         """(DEPTHS,) m, at which a place is solved that was pressed so deep."""
         return min(deepest_m, MOST_RADII * self.tip_radius_m) * np.linspace(0.0, 1.0, DEPTHS + 1)[1:]
 
-    def normal_force(self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray) -> np.ndarray:
+    def normal_force(
+        self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, progress: Progress = silent
+    ) -> np.ndarray:
         """(k,) N over Pa, at depths (k,) m; nan from the first that finds no equilibrium."""
         key = content_key(*self._content, np.asarray(point), np.asarray(normal), depths)
         path = cache_folder() / "presses" / f"{key[:24]}.bin"
-        made = load_or_build(path, key, lambda: {"force": self.solver.press(point, normal, depths).force})
+
+        def solved() -> dict[str, np.ndarray]:
+            return {"force": self.solver.press(point, normal, depths, progress=progress).force}
+
+        made = load_or_build(path, key, solved)
         return made["force"] @ normal
 
 

@@ -31,6 +31,11 @@ def digest(truth: Mapping[str, Any], salt: str) -> str:
     return hashlib.sha256(salt.encode() + canonical(truth)).hexdigest()
 
 
+def seal_of(samples: Path) -> Path:
+    """The seal beside a recording's samples."""
+    return samples.with_name(samples.name.removesuffix(".gz").removesuffix(".csv") + ".sealed")
+
+
 def write_sealed(
     path: Path | str,
     recording: Recording,
@@ -48,8 +53,7 @@ def write_sealed(
     salt = secrets.token_hex(32)
     plain = json.loads(canonical(truth))
     samples = write(path, replace(recording, truth=None, object_name="object"))
-    stem = samples.name.removesuffix(".gz").removesuffix(".csv")
-    seal = samples.with_name(f"{stem}.sealed")
+    seal = seal_of(samples)
     if truth_path.resolve() == seal.resolve():
         raise RecordingError(
             f"--truth {truth_path} is the seal itself: name another file, out of sight of the judge"

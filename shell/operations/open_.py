@@ -102,9 +102,12 @@ def open(
     from palpate.importing.kinds import kind_of_file
     from palpate.mechanics.recording.recording import Recording as Plain
     from palpate.operations.read_recording import read_recording
+    from palpate.scenes.embedded import embedded_names, embedded_recording
 
     if not files:
         raise OptionError("pp.open needs a file: name at least one")
+    if files[0] in embedded_names():
+        files = (embedded_recording(files[0]), *files[1:])
     columns, units = named(columns, "columns"), named(units, "units")
     kind = "recording"
     if not isinstance(files[0], Plain):

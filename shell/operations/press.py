@@ -120,8 +120,8 @@ def press(
         radius,
     )
     if places is not None:
-        with call.progress("solving the place"):
-            curve = solved(curve, places)
+        with call.progress("press") as show_progress:
+            curve = solved(curve, places, show_progress)
     if is_surface_file(Path(str(model))) and file.get("young_modulus_pa") is None:
         call.then(f"  (the file says none: {DEFAULT_MODULUS_PA:g} Pa, unless --modulus states another)")
     call.then_save(curve, output)

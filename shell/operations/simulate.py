@@ -121,7 +121,7 @@ def simulate(
     """
     from palpate.scenes.laboratory.curves import Solving
     from palpate.scenes.laboratory.hand import cohort_hand
-    from palpate.scenes.laboratory.sealing import write_sealed
+    from palpate.scenes.laboratory.sealing import seal_of, write_sealed
     from palpate.scenes.laboratory.session import Staging
     from palpate.scenes.laboratory.simulate import simulate as simulated
     from palpate.scenes.phantoms import Phantom
@@ -158,9 +158,21 @@ def simulate(
         call.then(f"written to {result.recording.path}")
         return result
     path = write_sealed(str(save), result.recording, result.truth, str(truth))
-    call.then(f"written to {path}")
+    seal_file = seal_of(path)
+    opening = (
+        "from palpate.scenes.laboratory.sealing import opened; "
+        f"print(opened({str(seal_file)!r}, {truth!r})['strengths'])"
+    )
+    call.then(
+        f"written to {path}, without its truth",
+        f"sealed: {seal_file} holds a hash of the truth; the truth itself, and the salt of the hash: {truth}",
+    )
     unlabelled = dataclasses.replace(result, recording=read_recording(path))
-    call.following = [partial(next_lines, unlabelled)]
+    call.following = [
+        partial(next_lines, unlabelled),
+        "      with a verdict, see what was sealed, and that nobody changed it (no command compares them):",
+        f'      python -c "{opening}"',
+    ]
     sealed: Any = _Sealed(result, path)
     return sealed
 

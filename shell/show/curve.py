@@ -70,20 +70,19 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
 
 
 def _solved(exact: SolvedPlace) -> say.Story:
-    """Law, solution and bound along the depth."""
+    """Law and solution along the depth; what the force may be off by stands above."""
     yield say.Detail(
         f"solved here, elastic and along the normal; the forces above are by it: {exact.solved_n[-1]:.3g} N "
         f"at the deepest, where the law's table alone says {exact.law_n[-1]:.3g} N"
     )
-    rows = zip(1e3 * exact.depth_m, exact.law_n, exact.solved_n, exact.error_n, strict=True)
-    yield solved_rows("depth [mm]", rows)
+    yield solved_rows("depth [mm]", zip(1e3 * exact.depth_m, exact.law_n, exact.solved_n, strict=True))
 
 
-def solved_rows(depth: str, rows: Iterable[tuple[float, float, float, float]]) -> say.Rows:
-    """Of solved places: depth (mm; so called), law, solution and bound, N."""
-    header = (f"    {depth}", "law [N]", "solved [N]", "the law may be off by [N]")
-    shown = [(f"{d:.2f}", f"{law:.3f}", f"{by:.3f}", f"{bound:.3f}") for d, law, by, bound in rows]
-    return say.Rows(header, shown, (len(header[0]), 10, 13, 12), on=say.TEXT)
+def solved_rows(depth: str, rows: Iterable[tuple[float, float, float]]) -> say.Rows:
+    """Of solved places: depth (mm; so called), law and solution, N."""
+    header = (f"    {depth}", "law [N]", "solved [N]")
+    shown = [(f"{d:.2f}", f"{law:.3f}", f"{by:.3f}") for d, law, by in rows]
+    return say.Rows(header, shown, (len(header[0]), 10, 13), on=say.TEXT)
 
 
 KEYS: tuple[say.Key, ...] = (

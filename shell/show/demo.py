@@ -24,7 +24,7 @@ from palpate.show.quantities import ERROR, UNCERTAINTY
 from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.scenery import Colours, draw_object, draw_touched
 from palpate.show.view3d import Colouring, Line, View
-from palpate.words import begun, force_words, kpa, mn, spoken, sure_kpa
+from palpate.words import begun, force_words, kpa, mn, share_words, spoken, sure_kpa
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -157,14 +157,17 @@ def diagnosis_words(result: DemoResult) -> str:
     found, law = result.diagnosis, result.model.material.dent_law
     assert found is not None
     there = _has(result)
-    words = (
-        "The simplest simulation, of small deformations and one stiffness, is "
-        f"{mn(found.gap_before_n)} off at places that it was not fitted to"
-        " (each press followed from its measured first touch: unlike above, the shape's error is left out)"
-    )
+    words = "The simplest simulation has small deformations and one stiffness. "
     if found.effects:
-        words += f"; with {spoken(found.effects)} it is {mn(found.gap_after_n)} off"
-    words += f". The sensor's noise is {mn(found.noise_n)}."
+        words += f"It leaves out {spoken(found.effects)}"
+        if found.gap_closed is not None:
+            words += (
+                f", which explains {share_words(found.gap_closed)} of what it is off beyond the sensor's "
+                "noise, at places that it was not fitted to"
+            )
+        words += "."
+    else:
+        words += "Nothing was named that it leaves out."
     has = [name for name in found.effects if name in there]
     if has:
         words += f" The model that you feel has {spoken(has)} already: its {law} law stands for it."

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from palpate.diagnosis.explore.state import ExplorationState
 from palpate.diagnosis.explore.suggestion import Explored, Step
 from palpate.show import story as say
 from palpate.show.colours import COLOURS
@@ -29,20 +30,21 @@ def story(result: Explored) -> say.Story:
     yield say.Title(f"Exploration of {name}", suffixed=True)
     state, recording = result.state, file_words(result.path, "REC")
     how = f"{'ended' if result.last.kind == 'stop' else 'not ended, next'}: {result.last.why}"
-    yield say.Headline(
-        f"{state.made} presses in {state.seconds:.0f} s: {state.words or 'nothing is known yet'}"
-    )
+    made = f"{state.made} presses in {state.seconds:.0f} s"
+    yield say.Headline(f"{made}: {state.words or 'nothing is known yet'}", on=say.TEXT)
+    yield say.Headline(f"{made}: {_reached(state) or 'nothing is known yet'}", on=say.PAGE)
     yield say.Detail(how, on=say.TEXT)
     soft = np.isfinite(state.modulus_pa)
     soft_words = f"About as soft as {softness(state.modulus_pa)}. " if soft else ""
-    why = how.removesuffix(f": {state.words}")  # which stands above
+    why = how.removesuffix(state.words).rstrip(":; ")  # what is known stands above
     yield say.Sentence(f"{soft_words}The exploration {why}", on=say.PAGE)
     if state.trouble:
         yield say.Sentence(f"The last touch could not be used: {state.trouble}", on=say.PAGE)
-    go_on = f"go on: the same command with `--continue {recording}`"
+    more = f" --most {2 * state.made}" if result.last.kind == "stop" else ""
+    go_on = f"go on: the same command with `--continue {recording}{more}`"
     yield say.Next([
         f"make a model of it: `palpate reconstruct {recording} -o MODEL`",
-        *([go_on] if result.last.kind != "stop" else []),
+        *([] if state.done else [go_on]),
     ])  # fmt: skip
     yield say.Rows(
         ["goal", "now", "wanted", "reached"],
@@ -98,7 +100,7 @@ def _draw_surface(result: Explored, ax: Axes) -> None:
         goal = 1e3 * result.goals.surface_within_m
         ax.axhline(goal, ls="--", lw=1, color=COLOURS["goal"], label="goal")
     _over_presses(ax, "95 % of the surface within [mm]")
-    ax.set_ylim(bottom=0)
+    ax.set_ylim(0, 1.15 * ax.get_ylim()[1])
     if known:
         ax.legend(frameon=False, loc="upper right")
 
@@ -153,9 +155,14 @@ def _goal(name: str, value: float) -> str:
 
 def _rows(result: Explored) -> list[list[object]]:
     return [
-        [k, "made before" if s.asked is None else s.asked.why, s.state.trouble or s.state.words or "-"]
+        [k, "made before" if s.asked is None else s.asked.why, s.state.trouble or _reached(s.state) or "-"]
         for k, s in enumerate(result.steps, 1)
     ]
+
+
+def _reached(state: ExplorationState) -> str:
+    """What is known, without what was asked for: a table says that."""
+    return state.words.removesuffix(f" (asked: {state.asked})")
 
 
 def _draw_places(result: Explored, ax: Axes) -> None:

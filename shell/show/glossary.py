@@ -49,7 +49,7 @@ class Terms:
         return "".join(out)
 
     def _link(self, found: re.Match[str]) -> str:
-        word = _known()[found[1].lower()]
+        word = _known()[found[1].lower().replace("\u00a0", " ")]
         if word in self.used:
             return found[0]
         self.used[word] = _slug(word)
@@ -81,4 +81,7 @@ def _known() -> dict[str, str]:
 @cache
 def _pattern() -> re.Pattern[str]:
     words = sorted(_known(), key=len, reverse=True)
-    return re.compile(r"(?<![\w-])(" + "|".join(map(re.escape, words)) + r")s?(?![\w-])", re.IGNORECASE)
+    return re.compile(
+        r"(?<![\w-])(" + "|".join(map(re.escape, words)).replace(r"\ ", r"\s") + r")s?(?![\w-])",
+        re.IGNORECASE,
+    )

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.resources import files
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -136,7 +137,7 @@ class Page:
 
     def lead(self, text: str) -> None:
         """The answer, in large type."""
-        self._parts.append(f'<p class="lead">{self._words(_UNIT.sub(NO_BREAK, text))}</p>')
+        self._parts.append(f'<p class="lead">{self._words(text)}</p>')
 
     def paragraph(self, text: str) -> None:
         """Plain words; what stands between backticks is code."""
@@ -160,7 +161,9 @@ class Page:
         self._parts.append(f'<div class="cards">{inside}</div>')
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
-        """A table; floats to four significant digits."""
+        """A table; floats to four significant digits. A column in which no row says anything is left out."""
+        told = [not rows or any(row[k] != "" for row in rows) for k in range(len(header))]
+        header, *rows = (list(compress(row, told)) for row in (header, *rows))
         wordy = [any(_is_words(row[k]) for row in rows) for k in range(len(header))]
         kind = [' class="words"' if w else "" for w in wordy]
         head = "".join(f"<th{k}>{html.escape(h)}</th>" for k, h in zip(kind, header, strict=True))
@@ -237,7 +240,7 @@ class Page:
         return scripts() + own
 
     def _words(self, text: str) -> str:
-        return self._terms.linked(_words(text))
+        return self._terms.linked(_words(_UNIT.sub(NO_BREAK, text)))
 
     def _picture(self, each: Picture) -> Any:
         """A picture, drawn; as a file too, drawn once for both, where it has a name and there is a folder."""
@@ -307,8 +310,10 @@ def file_text(name: str) -> str:
 
 
 NO_BREAK = "\u00a0"
-_UNIT = re.compile(r"(?<=\d) (?=(?:[mkMG]?(?:N|Pa|Hz)|[mcµ]?m|[mµ]?s|m?N/mm?)\b)(?=[^`]*(?:`[^`]*`[^`]*)*$)")
-"""The space between a number and its unit, outside of what is marked as code."""
+_UNIT = re.compile(
+    r"(?<=\d) (?=(?:[mkMG]?(?:N|Pa|Hz)|[mcµ]?m|[mµ]?s|m?N/mm?)\b|%)(?=[^`]*(?:`[^`]*`[^`]*)*$)"
+)
+"""The space between a number and its unit or per cent sign, outside of what is marked as code."""
 
 
 def _words(text: str) -> str:

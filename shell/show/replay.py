@@ -41,11 +41,11 @@ def story(result: ReplayResult) -> say.Story:
 
 
 def _solved(exact: ExactReplay) -> say.Story:
-    """Law, solution and bound at the deepest of each place."""
+    """Law and solution at the deepest of each place."""
     yield say.Detail(f"solved at {len(exact.places)} places, and the forces are by it")
     yield solved_rows(
         "at the deepest [mm]",
-        [(1e3 * p.depth_m[-1], p.law_n[-1], p.solved_n[-1], p.error_n[-1]) for p in exact.places],
+        [(1e3 * p.depth_m[-1], p.law_n[-1], p.solved_n[-1]) for p in exact.places],
     )
     if exact.unsolved:
         yield say.Detail(f"{exact.unsolved} places keep the law: no equilibrium was found there")

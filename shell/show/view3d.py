@@ -133,11 +133,19 @@ def _rows(view: View) -> tuple[list[str], list[list[str]]]:
     shown = [(c, values) for c, values in shown if c.quantity is not ORDER]
     head = ["press", "at x, y, z [mm]"]
     head += [c.title + (f" [{c.quantity.unit}]" if c.quantity.unit else "") for c, _ in shown]
+    columns = [_alike(values) for _, values in shown]
     rows = []
     for i, place in enumerate(1e3 * view.places):
         row = [str(i + 1), ", ".join(f"{v:.0f}" for v in place.round() + 0.0)]
-        rows.append(row + ["–" if not np.isfinite(v[i]) else f"{v[i]:.3g}" for _, v in shown])
+        rows.append(row + [cells[i] for cells in columns])
     return head, rows
+
+
+def _alike(values: np.ndarray) -> list[str]:
+    """Numbers of a column, all with the decimals of its greatest at three digits."""
+    most = np.nanmax(np.abs(values), initial=0.0, where=np.isfinite(values))
+    decimals = max(0, 2 - int(np.floor(np.log10(most)))) if most > 0 else 0
+    return [f"{v:.{decimals}f}" if np.isfinite(v) else "–" for v in values]
 
 
 def _table(view: View) -> str:

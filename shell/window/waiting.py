@@ -21,11 +21,10 @@ from palpate.scenes.phantoms import phantom
 from palpate.scenes.scene import Scene
 from palpate.show.colours import COLOURS, GREY, HINT, PAPER, STAGE
 from palpate.window.picture import SKIN, add_lights
-from palpate.window.widgets import Board, Item
+from palpate.window.widgets import SIZE, Board, Item, fit_screen
 
 T = TypeVar("T")
 PERIOD_S = 0.05
-SIZE = (1280, 800)
 COLUMNS = 3
 SPACE, HEAD, PICTURE = 16, 76, 250
 """Between cards, above them, and the height of a card's picture, pixels of a window of full size."""
@@ -75,6 +74,7 @@ class WaitingWindow:
             lighting="none",
             title="Palpate",
         )
+        fit_screen(self.plotter)
         base, *self._views = self.plotter.renderers
         base.set_background(STAGE)
         base.viewport = (0.0, 0.0, 1.0, 1.0)

@@ -24,6 +24,10 @@ from vtkmodules.vtkRenderingCore import (
 from palpate.show.colours import ACCENT, BUTTON, INK, NIGHT, OVER, PAPER
 from palpate.window.lettering import cut, set_type, text_width, wrapped
 
+SIZE = (1280, 800)
+"""Of a window at full size, pixels."""
+_BESIDE = (16, 88)
+"""What frame, title and task bar take of a screen, pixels."""
 BODY = 13
 """Size of type in pixels, of a window of full size."""
 MARGIN, GAP, BUTTON_HEIGHT, SLIDER_HEIGHT, LINE = 14, 6, 30, 20, 1.32
@@ -66,6 +70,17 @@ class _Words:
     bold: bool
     colour: str
     centred: bool = False
+
+
+def fit_screen(plotter: pyvista.Plotter) -> None:
+    """Make a window no larger than what its screen has room for: the foot of one that is cannot be seen."""
+    if not plotter.off_screen and plotter.render_window is not None:
+        plotter.window_size = list(fitted(plotter.window_size, plotter.render_window.GetScreenSize()))
+
+
+def fitted(size: Sequence[int], screen: Sequence[int]) -> tuple[int, ...]:
+    """A window's size, pixels, on a screen of this size."""
+    return tuple(min(own, there - taken) for own, there, taken in zip(size, screen, _BESIDE, strict=True))
 
 
 class Board:

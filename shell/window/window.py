@@ -15,6 +15,7 @@ import numpy as np
 import pyvista
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from palpate.child import loaded_whole
 from palpate.devices.channel import PoseChannel
 from palpate.mechanics.disk.writing import PNG, atomic_file
 from palpate.scenes.phantoms import Region
@@ -31,12 +32,11 @@ from palpate.window.picture import ObjectPicture, add_lights
 from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
-from palpate.window.widgets import Board, Item
+from palpate.window.widgets import SIZE, Board, Item, fit_screen
 from palpate.window.worker import Frame, Pace, RendererView, level
 from palpate.words import begun, renderer_words, sentence
 
 PERIOD_MS = 16
-SIZE = (1280, 800)
 COLUMN, CHARTS = 280, 190
 """Width of the columns beside the pictures and height of the plots, pixels of a window of full size."""
 LEAST_SCALE, MOST_SCALE = 0.55, 2.5
@@ -110,6 +110,7 @@ class TouchWindow:
             border=False,
             lighting="none",
         )
+        fit_screen(plotter)
         for renderer in plotter.renderers:
             renderer.set_background(STAGE)
             # blending in any order takes several passes over the whole picture; a shadow needs one
@@ -327,8 +328,9 @@ class TouchWindow:
         interactor.AddObserver("TimerEvent", lambda *_: self._timed(screenshot))
         interactor.CreateRepeatingTimer(PERIOD_MS)
         interactor.AddObserver("ExitEvent", lambda *_: self.close())
-        interactor.Start()
-        self.plotter.close()
+        with loaded_whole(self.close):
+            interactor.Start()
+            self.plotter.close()
 
     def _timed(self, screenshot: Path | None) -> None:
         if self._ended:

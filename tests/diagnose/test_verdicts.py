@@ -23,10 +23,12 @@ from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.presses.gap_bins import gap_by_bin
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.show.demo import diagnosis_json, diagnosis_words
+from palpate.show.diagnosis.figures import press_pictures
 from palpate.show.diagnosis.gaps import press_gaps
 from palpate.show.diagnosis.parameters import parameter_rows, short
 from palpate.show.diagnosis.story import next_steps
 from palpate.show.diagnosis.words import how_sure, short_verdict, verdict, where
+from palpate.show.page import file_text
 from palpate.words import force_words, spoken
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
@@ -294,7 +296,8 @@ def test_the_page_says_what_to_do_and_its_view_switches_effects_on(
     recording, model, result = delayed
     text = result.report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "time delay" in text and 'class="view3d"' in text
-    view = result.view()
+    several = dataclasses.replace(result, effects=("time_delay", "finite_strain"))
+    view = several.view()
     measured, simulated, found, *effects = view.traces.lines
     late = next(line for line in effects if "time delay" in line.name)
     counted = result.forward.touches.counted
@@ -329,6 +332,18 @@ def test_bars_are_few_and_are_the_gaps_without_and_with_what_was_found(delayed):
     assert ax.lines[0].get_xdata()[0] == pytest.approx(1e3 * result.noise_n)
 
 
+def test_a_press_looks_alike_in_the_view_and_in_the_pictures(delayed):
+    """What was found was solid in one and dashed in the other, and offered twice where it is one effect."""
+    result = delayed[2]
+    lines = {line.name: line.kind for line in result.view().traces.lines}
+    assert "with time delay" not in lines
+    (dashed,) = re.findall(r"path:is\(([^)]*)\) \{ stroke-dasharray", file_text("page.css"))
+    picture = press_pictures(result)[0].draw()
+    for line in picture.axes[0].lines:
+        name = line.get_label()
+        assert (line.get_linestyle() == "--") == (f".{lines[name]}" in dashed.split(", ")), name
+
+
 def test_what_the_model_already_has_is_not_proposed_again(delayed, tmp_path, no_pictures, nothing_to_press):
     """The verdict, the terminal and the page agree; JSON still names every effect."""
     recording, model, found = delayed
@@ -355,6 +370,8 @@ def test_what_is_missing_and_unknown_is_not_called_nothing(delayed):
     )
     assert "Nothing" not in verdict(open_) and "does not know" in verdict(open_)
     assert how_sure(open_)[1].startswith("Finite strain")
+    # '89 % sure' stood over 'less likely than one in ten together'
+    assert "in ten" not in how_sure(dataclasses.replace(open_, kind="effect"))[2]
 
 
 def test_what_no_model_holds_is_not_to_be_put_into_one(delayed):

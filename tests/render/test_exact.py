@@ -44,7 +44,9 @@ def test_a_solved_press_lies_beside_the_law_and_is_kept(cylinder_renderer, exact
     at = curve.deepest
     np.testing.assert_allclose(by.force[at], curve.force[at] * by.exact.factor(curve.depth[at]))
     assert by.force[at] @ by.normal == pytest.approx(by.exact.solved_n[-1], rel=0.02)
-    assert f"the law's table alone says {by.exact.law_n[-1]:.3g} N" in "\n".join(by.lines())
+    said = "\n".join(by.lines())
+    assert f"the law's table alone says {by.exact.law_n[-1]:.3g} N" in said
+    assert said.count("may be off") == 1  # a third figure of its own definition stood in the table
 
     def unasked(*_):
         raise AssertionError("solved twice")
@@ -120,3 +122,13 @@ def test_the_command_says_law_solution_and_bound(block_folder, kept, monkeypatch
     assert len(own["depth_m"]) == len(own["law_n"]) == len(own["solved_n"]) == len(own["force_error_n"]) == 6
     assert main([*place, "--renderer", "kelvin-voigt"]) == 2
     assert "'fem'" in capsys.readouterr().err
+
+
+def test_a_place_says_how_far_it_is_solved(exact):
+    """A bar stood at nothing for a minute."""
+    told = []
+    up = np.array([0.0, 0.0, 1.0])
+    exact(np.array([0.005, 0.0, 0.08]), up, 1e-3, lambda stage, share: told.append((stage, share)))
+    shares = [share for _, share in told]
+    assert len(set(shares)) > 3 and shares == sorted(shares) and 0 <= shares[0] and shares[-1] <= 1
+    assert all("1 mm" in stage for stage, _ in told)

@@ -15,7 +15,7 @@ from palpate.operations.press import _compared
 from palpate.operations.touch import _Opening
 from palpate.reconstruction.checks.finding import Finding
 from palpate.render.press import Curve
-from palpate.words import estimate_words, gathered, place_mm
+from palpate.words import chance_words, estimate_words, gathered, place_mm
 
 
 def test_a_finding_says_its_cure_once():
@@ -88,3 +88,10 @@ def test_a_touch_says_what_was_made_of_an_open_surface(block):
 
 def test_no_coordinate_is_minus_nothing():
     assert place_mm((0.01, -0.024, -1e-9)) == "(10, -24, 0) mm"
+
+
+def test_chances_are_told_as_one_says_them():
+    """'1 times in 100' stood in a table."""
+    assert [chance_words(p) for p in (0.001, 0.012, 0.02, 0.9, 1.0)] == [
+        "less than once in 100", "once in 100", "2 times in 100", "90 times in 100", "always"
+    ]  # fmt: skip

@@ -210,9 +210,8 @@ def button(model: Model) -> str:
     if not _at_hand(model):
         folder = html.escape(typed_word(model.path or "MODEL"))
         return (
-            '<details class="press-it"><summary>press it</summary><p>A page in which this object '
-            "can be pressed, by mouse, finger or keyboard, in any browser: "
-            f"<code>palpate export {folder} --to page -o touch.html</code></p></details>"
+            '<p class="press-it">Press it in a browser, by mouse, finger or keyboard: '
+            f'<code class="command">palpate export {folder} --to page -o touch.html</code></p>'
         )
     page = gzip.compress(page_of(FemRenderer(model)).encode(), 9, mtime=0)
     return file("button.html").replace("{{page}}", base64.b64encode(page).decode()).rstrip("\n")

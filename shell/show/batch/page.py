@@ -17,8 +17,8 @@ from palpate.diagnosis.compare.models import RIVALS
 from palpate.show import story as say
 from palpate.show.colours import COLOURS
 from palpate.show.diagnosis.words import short_verdict
-from palpate.show.page import new_figure
-from palpate.words import counted, kpa, mn, typed_word
+from palpate.show.page import file_words, new_figure
+from palpate.words import counted, kpa, mn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,8 +93,13 @@ def _page(result: Batch) -> say.Story:
             'aria-label="find recordings"></p>'
         )
     yield say.Markup(_recordings(result))
+    told = []
+    if "diagnose" in result.steps:
+        told.append("of the simplest simulation (small deformations, one stiffness), and with what is found")
     if "compare" in result.steps:
-        yield say.Sentence("Errors of FEM and of the best 1D model: rms force at held-out touches.")
+        told.append("of FEM and of the best 1D model as they are, fitted without those presses")
+    if told:
+        yield say.Sentence(f"Forces in mN are root mean square errors at held-out places: {'; '.join(told)}")
     yield say.Markup('<p>The table as a file: <a href="summary.csv">summary.csv</a>.</p>')
     if cost := _cost(result):
         yield say.Section("What did it cost?", [say.Markup(cost)])
@@ -138,7 +143,7 @@ def next_steps(result: Batch) -> list[str]:
     if any(e.row.status != "done" for e in result.entries):
         return ["mend what a row names, and run the same command again; what is done is kept"]
     feel = (
-        f"`palpate touch {typed_word(result.folder / first / 'model')}`"
+        f"`palpate touch {file_words(result.folder / first / 'model', '')}`"
         if first
         else "`palpate touch OUT/NAME/model`"
     )
@@ -175,7 +180,11 @@ def _agreement(result: Batch) -> say.Story:
 
 def _recordings(result: Batch) -> str:
     heads = ["", "recording", "object", "presses", "modulus [kPa]"]
-    heads += ["verdict", "gap before [mN]", "gap after [mN]"] if "diagnose" in result.steps else ["status"]
+    heads += (
+        ["verdict", "simplest simulation off [mN]", "with the verdict [mN]"]
+        if "diagnose" in result.steps
+        else ["status"]
+    )
     heads += ["error of FEM [mN]", "of best 1D [mN]"] if "compare" in result.steps else []
     rows = [(e.row.status, _row(result, e)) for e in result.entries]
     return _table([*heads, "CPU [s]"], rows, "recordings")

@@ -112,9 +112,10 @@ def _how(result: Comparison) -> say.Story:
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
         "paths, each from its own measured first touch, so that the shape's error is left out (a replay has "
         "it in it). Errors are root mean squares of the force vector; the sensor's noise alone is "
-        f"{mn(result.noise_n)}. The 1D models are fitted press by press and interpolated over the "
-        "surface; FEM has one number for the whole object, its Young's modulus, or a smooth field of it "
-        "where the presses that it is fitted to show one: they did in "
+        f"{mn(result.noise_n)}. Along the normal alone they are {_along(result)}. The 1D models are fitted "
+        "press by press and interpolated over the surface; FEM has one number for the whole object, its "
+        "Young's modulus, or a smooth field of it where the presses that it is fitted to show one: they did "
+        "in "
         f"{sum(f is not None for f in result.fields)} of {len(result.fields)} fits."
     )
     for name in (n for n in compared(result) if n not in MODELS):
@@ -122,6 +123,12 @@ def _how(result: Comparison) -> say.Story:
             f"{name} was run along the recorded path; its modulus is fitted to the same presses, as its "
             "force goes with it."
         )
+
+
+def _along(result: Comparison) -> str:
+    """Each model's error along the normal alone, and the noise of that one component."""
+    errors = (f"{called(m)} {mn(off)}" for m, off in result.normal_rmse_n.items())
+    return listed([*errors, f"noise {mn(result.noise_n / np.sqrt(3.0))}"])
 
 
 def _evidence(result: Comparison) -> say.Story:
@@ -231,12 +238,10 @@ def meaning(result: Comparison) -> str:
         f"noise, which is in both, is {noise:.0f} mN."
     )
     along = result.normal_rmse_n
-    best_along = min(RIVALS, key=along.__getitem__)
+    times = min(along[name] for name in RIVALS) / max(along["fem"], 1e-12)
     words += (
-        " A 1D model has no sideways force by definition. Along the normal alone the FEM is "
-        f"{mn(along['fem'])} off, {called(best_along)} {mn(along[best_along])}, "
-        f"{along[best_along] / max(along['fem'], 1e-12):.1f} times as much (noise: "
-        f"{mn(result.noise_n / np.sqrt(3.0))})."
+        " A 1D model has no sideways force by definition; along the normal alone the better one is "
+        f"{times:.1f} times as far off as the FEM."
     )
     wins = result.wins("fem")
     words += f" Of {len(result.presses)} presses, each left out of the fits, the FEM predicts {wins} best."

@@ -71,7 +71,7 @@ def view(result: Diagnosis, simulated: str = "simplest") -> View:
     lines += [
         line(f"with {beside(result, e.name)}", residual, "effect", False)
         for e in shown_entries(result)
-        if (residual := residual_with(result, e.name)) is not None
+        if list(result.effects) != [e.name] and (residual := residual_with(result, e.name)) is not None
     ]
     error = Colouring(
         ERROR,
@@ -120,12 +120,10 @@ def _press(ax: Any, result: Diagnosis, press: int, simulated: str) -> None:
         pull = (measured * np.linalg.norm(measured[:, 1:], axis=1)[:, None]).sum(axis=0) * [0.0, 1.0, 1.0]
         along = pull / max(float(np.linalg.norm(pull)), 1e-12)
     ax.plot(clock, measured @ along, color=COLOURS["measured"], lw=1.8, label="measured")
-    ax.plot(clock, (measured - before[rows]) @ along, color=colour_of(simulated), lw=1.2, label="simulated")
+    without, found = (measured - before[rows]) @ along, (measured - after[rows]) @ along
+    ax.plot(clock, without, color=colour_of(simulated), lw=1.2, ls="--", label="simulated")
     if result.effects:
-        ax.plot(
-            clock, (measured - after[rows]) @ along, color=COLOURS["found"], lw=1.2, ls="--",
-            label="simulated with what was found",
-        )  # fmt: skip
+        ax.plot(clock, found, color=COLOURS["found"], lw=1.2, label="with what was found")
     ax.set(
         xlabel="time since first touch [s]",
         ylabel=f"force {'sideways' if sideways(result) else 'into the surface'} [N]",

@@ -156,7 +156,7 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
 
 
 def _caption(result: Diagnosis) -> str:
-    after = ", with what was found (dashed)" if result.effects else ""
+    after = ", and with what was found" if result.effects else ""
     return (
         "Left: how far the simulated force is from the measured one around each place that was touched, in "
         "millinewtons (1 mN: the weight of a tenth of a gram). Right: measured and simulated force of one "

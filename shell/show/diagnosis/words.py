@@ -146,8 +146,8 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
         )  # fmt: skip
     sure = {e.name: e.probability for e in result.entries if e.name in result.effects}
     text = (
-        "All other sets of effects that were tried, and that nothing is missing, are less likely than one "
-        "in ten together. How evidence counts was learnt from simulated recordings whose truth is known."
+        "All other sets of effects that were tried, and that nothing is missing, share the rest. "
+        "How evidence counts was learnt from simulated recordings whose truth is known."
     )
     if len(sure) == 1 and "unknown" not in result.kind:
         return question, f"{percent(sum(sure.values()))} sure", text

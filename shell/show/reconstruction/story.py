@@ -127,11 +127,12 @@ def _taken(result: Reconstruction) -> str:
 
 
 def _meant(result: Reconstruction) -> say.Story:
-    yield say.Detail(_taken(result))
+    yield say.Detail(_taken(result), on=say.TEXT)
     if not result.doubt:
         words = meaning(result)
         yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in words.split(". "))
         yield say.Detail(words, on=say.PAGE)
+    yield say.Sentence(f"This holds {_taken(result)}", on=say.PAGE)
 
 
 def _made(result: Reconstruction) -> say.Story:
@@ -388,11 +389,8 @@ def _how(result: Reconstruction) -> say.Story:
             "the last column says how often it was each."
         )
         yield say.Rows(
-            ["dent law", "modulus [kPa]", "not explained of a press [mN]", "best in so many draws"],
-            [
-                [name, e / 1e3, f"{1e3 * misfit:.1f}", f"{100 * share:.0f} %"]
-                for name, (e, misfit, share) in fit.by_law.items()
-            ],
+            ["dent law", "modulus [kPa]", "best in so many draws"],
+            [[name, e / 1e3, f"{100 * share:.0f} %"] for name, (e, _, share) in fit.by_law.items()],
         )
 
 

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
+import subprocess
+import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -162,10 +166,18 @@ def test_sealed_recording_withholds_the_truth_and_the_seal_finds_changes(
         "sparse",
     ]
     assert main([*arguments, "--seal", "--truth", str(truth)]) == 0
-    assert f"palpate reconstruct {record} -o MODEL" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"palpate reconstruct {record} -o MODEL" in said
     recording = read_recording(record)
     assert recording.truth is None and "delay" not in (tmp_path / "case.toml").read_text()
     seal = tmp_path / "case.sealed"
+    # 'written to case.csv.gz' was all that was said of a seal
+    assert str(seal) in said and str(truth) in said
+    (command,) = re.findall(r"^ *python (-c .*)$", said, re.MULTILINE)
+    shown = subprocess.run(
+        [sys.executable, *shlex.split(command)], capture_output=True, text=True, check=True
+    )
+    assert "time_delay" in shown.stdout
     assert opened(seal, truth)["effects"] == ["time_delay"]
     kept = json.loads(truth.read_text())
     kept["truth"]["effects"] = ["backlash"]

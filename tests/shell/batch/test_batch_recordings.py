@@ -202,6 +202,8 @@ def test_the_page_links_every_report_and_escapes_what_people_name_things(tmp_pat
     assert "http" not in page  # nothing is fetched
     # the FEM of one modulus is no 1D model
     assert 'data-name="of best 1D [mN]" data-by="0.17"' in page
+    # four errors stood in a row by two definitions, of which one was told
+    assert "gap " not in page.partition("<tbody>")[0] and "of the simplest simulation" in page
 
 
 def test_parquet_has_the_same_columns(tmp_path, quick):

@@ -73,6 +73,13 @@ def test_without_a_terminal_what_is_open_is_one_line(tmp_path, capsys):
     assert len(said) == 1 and "--tip-radius" in said[0]
 
 
+def test_an_embedded_recording_is_opened_by_its_name(capsys):
+    """Every other command knew the name; this one said that no such file is there."""
+    assert cli.main(["open", "silicone-1-cylinder", "--tip", "cone", "--tip-angle", "30"]) == 2
+    said = capsys.readouterr().err
+    assert "does not exist" not in said and "cone" in said
+
+
 def test_other_commands_point_to_it(tmp_path, capsys):
     file = log(tmp_path)
     assert cli.main(["reconstruct", str(file), "-o", str(tmp_path / "model")]) == 2

@@ -19,7 +19,7 @@ _HEX = re.compile(r"[\"'](#[0-9a-fA-F]{3,8})[\"']")
 THINGS = {  # label in a picture -> thing
     "measured": "measured", "rendered": "fem", "FEM": "fem", "FEM, one modulus": "fem-homogeneous",
     "Kelvin–Voigt spring": "kelvin-voigt", "Hunt–Crossley spring": "hunt-crossley", "simulated": "simplest",
-    "simulated with what was found": "found", "first touch": "touch", "first touches": "touch",
+    "with what was found": "found", "first touch": "touch", "first touches": "touch",
     "peak": "peak", "tracing the foot": "base-tracing", "sensor's noise": "noise",
     "measured, left out": "measured", "measured, fitted": "measured", "fixed base": "base",
 }  # fmt: skip

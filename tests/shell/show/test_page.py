@@ -96,8 +96,23 @@ def test_a_file_is_named_as_one_would_type_it(monkeypatch, tmp_path):
     assert file_words(embedded_recording("silicone-1-cylinder"), "REC") == "silicone-1-cylinder"
 
 
-def test_no_line_breaks_between_a_number_and_its_unit(tmp_path: Path) -> None:
+@pytest.mark.parametrize("said", ["lead", "paragraph"])
+def test_no_line_breaks_between_a_number_and_its_unit(said: str) -> None:
+    """A phone showed '(21' at the end of a line and 'mN)' on the next."""
     page = Page("x")
-    page.lead("It errs by 1.02 N, 3 mm deep, as `palpate press M --depth 3 mm` says")
-    text = page.write(tmp_path / "x.html").read_text(encoding="utf-8")
-    assert "1.02\u00a0N, 3\u00a0mm deep" in text and "--depth 3 mm</code>" in text
+    getattr(page, said)(
+        "It errs by 1.02 N or 5 %, 95 % sure, 3 mm deep, as `palpate press M --depth 3 mm` says"
+    )
+    text = page.html()
+    assert "1.02\u00a0N or 5\u00a0%" in text and "3\u00a0mm deep" in text and "95\u00a0%</a>" in text
+    assert "--depth 3 mm</code>" in text
+
+
+def test_a_column_that_says_nothing_is_left_out():
+    """'fitted values' stood over eight empty cells."""
+    page = Page("x")
+    page.table(["effect", "left [mN]", "fitted values"], [["creep", 22, ""], ["skin", 0, ""]])
+    text = page.html()
+    assert "fitted values" not in text and "<td>0</td>" in text.replace(' data-of="left [mN]"', "")
+    page.table(["at [s]", "why"], [])
+    assert "why</th>" in page.html()

@@ -84,7 +84,9 @@ def test_a_page_makes_sentences_and_leaves_the_terminals_lines_alone():
         say.Section("Why?", [say.Note("a reason"), say.Rows(["what"], iter([["a <b>"]]))]),
         say.Section("", [say.Markup("<hr>")]),
     )
-    assert said.startswith('<p class="lead">silicone: 5 % off.</p><p>It differs.</p><p>k_V is as it is</p>')
+    assert said.startswith(
+        '<p class="lead">silicone: 5\u00a0% off.</p><p>It differs.</p><p>k_V is as it is</p>'
+    )
     assert (
         "<h2>Why?</h2></summary><p>A reason.</p>" in said and "a &lt;b&gt;" in said and said.endswith("<hr>")
     )

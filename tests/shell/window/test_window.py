@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -24,8 +26,9 @@ from palpate.window.game import Game
 from palpate.window.keys import KEYS
 from palpate.window.panel import DEPTH
 from palpate.window.session import SessionOptions
-from palpate.window.widgets import BODY
-from palpate.window.window import COLUMN
+from palpate.window.widgets import BODY, fitted
+from palpate.window.widgets import SIZE as FULL
+from palpate.window.window import COLUMN, TouchWindow
 
 from ...support.waiting import PATIENCE_S, eventually
 from .driven import Driven, driving
@@ -602,3 +605,43 @@ def test_a_renderer_has_a_name_for_people_and_says_the_technical_one(driven: Dri
     assert tips["this model"] == "fem" and tips["Kelvin–Voigt spring"] == "kelvin-voigt"
     assert "fem" not in column.text and any("friction coefficient" in item.tip for item, _ in column.placed)
     driven.click("Close")
+
+
+@pytest.mark.parametrize("screen", [(1366, 768), (1024, 600), (1920, 1080), (3840, 2160)])
+def test_a_window_fits_its_screen(screen):
+    """Of 800 pixels on a laptop of 768 the time axes of the plots could not be seen."""
+    width, height = fitted(FULL, screen)
+    assert width <= min(FULL[0], screen[0]) and height <= min(FULL[1], screen[1] - 60)
+    assert (width, height) == FULL or screen[1] < 900
+
+
+class Forgetful:
+    """An interactor as VTK's is: what a callback raises is printed and forgotten."""
+
+    def __init__(self) -> None:
+        self.calls, self.on = {}, True
+
+    def AddObserver(self, event: str, call) -> None:
+        self.calls[event] = call
+
+    def CreateRepeatingTimer(self, period_ms: int) -> None:
+        pass
+
+    def Start(self) -> None:
+        for _ in range(9):
+            with suppress(BaseException):
+                self.calls["TimerEvent"]()
+
+    def TerminateApp(self) -> None:
+        self.on = False
+
+
+def test_ctrl_c_ends_a_session_whatever_it_is_drawing():
+    """Raised inside a picture's callback it was printed and forgotten: the window stayed."""
+    plotter, window = pyvista.Plotter(off_screen=True, window_size=[64, 48]), TouchWindow.__new__(TouchWindow)
+    window.plotter, window.closed, window.another, window._ended = plotter, False, False, False
+    window.controls = SimpleNamespace(interactor=Forgetful())
+    window.tick = lambda: signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        window.run()
+    assert not window.controls.interactor.on
