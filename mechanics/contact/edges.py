@@ -29,6 +29,8 @@ TURN_POWER = 3
 """Power of a rim's turn, over a right angle, with which it counts: solved for 60 and 90 degrees."""
 _REACH, _STEP = 3.5, 0.5
 """Widths of a Gaussian beyond which it is left out (0.002); between its samples."""
+_FOOT = 0.73
+"""Patch widths, of the Gaussian along the base's outline by which a patch on a flank reaches over it."""
 _ON_BASE = 0.2
 """Patch widths from the base within which a crease is the base's outline, no rim."""
 _AT_ONCE = 1000
@@ -65,6 +67,21 @@ def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np
     over = fitted()[1]
     near = laid(mesh, points, normals)
     return near[:, np.argmax(over == RIMS)], near[:, np.argmax(over == BASE)]
+
+
+def foot_within(mesh: TetMesh, points: np.ndarray) -> np.ndarray:
+    """(k,) how much of the patch of places (k, 3) would lie below the base's outline, by one Gaussian: 1 on
+    a straight outline, 0 far away."""
+    triangles, sigma = _base_triangles(mesh), _FOOT * usual_width(mesh)
+    pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    ends, count = np.unique(pairs, axis=0, return_counts=True)
+    a, b = mesh.points[ends[count == 1].T]
+    length = np.linalg.norm(b - a, axis=1)
+    parts = np.maximum(np.ceil(length / (_STEP * sigma)).astype(int), 1)
+    edge = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(edge)) - np.repeat(np.cumsum(parts) - parts, parts) + 0.5) / parts[edge]
+    samples = a[edge] + share[:, None] * (b - a)[edge]
+    return _summed(points, samples, (length / parts)[edge] / (np.sqrt(2 * np.pi) * sigma), sigma)
 
 
 def ends_within(mesh: TetMesh, points: np.ndarray, width_m: float) -> np.ndarray:
