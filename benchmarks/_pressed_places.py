@@ -133,7 +133,7 @@ def rendered(
     friction: float | None = None,
     bent: bool = True,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(places, depths) m^2 as rendered, neo-Hookean; (6, places) numbers of the places (render.force_error).
+    """(places, depths) m^2 as rendered, neo-Hookean; (8, places) numbers of the places (render.force_error).
 
     friction: None sticks. bent: the dent knows of the surface's curvature, else its effective radius alone.
     """

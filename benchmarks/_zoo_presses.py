@@ -58,11 +58,18 @@ class Places:
         return upright & thick & far & (np.abs(self.curvature) * tip < _GENTLE)
 
 
+def tip_of(model: Model) -> float:
+    """m, the radius of the tip by which an object is pressed."""
+    shape = model.mesh.shape
+    assert shape is not None
+    return min(TIP_M, _TIP_SHARE * float(np.ptp(shape.vertices, axis=0).min()))
+
+
 def places_of(model: Model, count: int, seed: int = 5) -> Places:
     """Places spread over a model's shape where a tip gets to them from outside."""
     shape, up = model.mesh.shape, model.support.normal
     assert shape is not None
-    tip = min(TIP_M, _TIP_SHARE * float(np.ptp(shape.vertices, axis=0).min()))
+    tip = tip_of(model)
     points, normals = shape.foot(sample(shape.vertices, shape.triangles, 60 * count, seed))
     height = model.support.height(points)
     from_above = np.einsum("kx,x->k", normals, up) > -0.3

@@ -4,7 +4,7 @@ Each of 60 files is given to `pp.model_of` as somebody would who never saw it; w
 refusal names is taken, twice at most. The model's volume is held against the object's; then it is made once
 more with tetrahedra of half the size (nearly, and not at all where that takes too much work), and both are
 pressed at the same places (benchmarks._zoo_presses): against one another, against Hertz where that applies,
-and against the solver of a press.
+and against the solver of a press. A hand's drawn ticks may follow (benchmarks._zoo_ticks).
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from benchmarks._zoo_damage import BROKEN, SCANS
 from benchmarks._zoo_parts import PARTS, PHANTOMS
 from benchmarks._zoo_presses import compare
 from benchmarks._zoo_shapes import ORGANS, Drawn
+from benchmarks._zoo_ticks import drawn_ticks
 from benchmarks.evidence import Figure, commit_of, rates
 from palpate.mechanics.errors import PalpateError
 from palpate.mechanics.model.model import Model
@@ -58,13 +59,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sizes", type=int, choices=(1, 2), default=2, help="of the mesh (default: 2)")
     parser.add_argument("--places", type=int, default=8, help="pressed on each; 0: none (default: 8)")
     parser.add_argument("--solved", type=int, default=1, help="of them solved too (default: 1)")
+    parser.add_argument("--ticks", type=int, default=0, help="drawn on each, condensed (default: none)")
     parser.add_argument("--work", metavar="FILE", help="keep each shape's line there: a stopped run goes on")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """{"shapes": {name: what became of it}, "figures"}; a line is printed for each shape."""
     chosen = [name for name in ZOO if arguments.only in name][: arguments.first : arguments.every]
-    setting = (arguments.sizes, arguments.places, arguments.solved)
+    setting = (arguments.sizes, arguments.places, arguments.solved, arguments.ticks)
     shapes: dict[str, dict[str, Any]] = {}
     with tempfile.TemporaryDirectory() as folder:
         kept = Path(arguments.work or Path(folder) / "kept.jsonl")
@@ -89,8 +91,10 @@ def _done(kept: Path, of: list[Any]) -> dict[str, dict[str, Any]]:
     return {line["name"]: line["found"] for line in lines if line["of"] == of}
 
 
-def tried(drawn: Drawn, folder: Path, sizes: int = 2, places: int = 8, solved: int = 1) -> dict[str, Any]:
-    """What becomes of one file, meshed in one or two sizes and pressed."""
+def tried(
+    drawn: Drawn, folder: Path, sizes: int = 2, places: int = 8, solved: int = 1, ticks: int = 0
+) -> dict[str, Any]:
+    """What becomes of one file, meshed in one or two sizes and pressed; ticks: drawn on it."""
     path, begun = folder / "shape.stl", time.process_time()
     drawn.mesh.export(path)
     found: dict[str, Any] = {"outcome": "", "given": {}, "said": "", "wrong": []}
@@ -103,6 +107,8 @@ def tried(drawn: Drawn, folder: Path, sizes: int = 2, places: int = 8, solved: i
             found |= {"volume_ratio": _volume_ratio(drawn, model, found["given"])}
             if places:
                 found |= compare(models, places, solved)
+            if ticks:
+                found |= drawn_ticks(model, ticks)
             _judge(found)
     except PalpateError as error:
         found |= {"outcome": OUTCOMES[3], "said": str(error)}
@@ -191,6 +197,8 @@ def _judge(found: dict[str, Any]) -> None:
         wrong += [f"sizes {x:+.3f} of {b:.3f} stated" for x, b in beside if abs(x) > _SIZES]
         wrong += [f"Hertz {x - 1:+.3f}" for x in found["over_hertz"] if abs(x - 1) > _HERTZ]
         wrong += [f"solver {x:+.3f} of {b:.3f}" for x, b in found["over_solver"] if abs(x) > b]
+    if found.get("jumps"):
+        wrong.append(f"{found['jumps']} jumps, {100 * found['worst_jump']:.0f} % of the force at worst")
     if wrong:
         found["outcome"] = "wrong"
 
@@ -209,6 +217,8 @@ def _line(name: str, one: dict[str, Any]) -> str:
                 words.append(f"{key} {100 * worst:+.1f} %")
         words += [f"solver {100 * x:+.1f} of {100 * b:.1f} %" for x, b in one["over_solver"]]
         words += one["said"] if isinstance(one["said"], list) else []
+    if one.get("ticks"):
+        words.append(f"{one['jumps']} jumps in {one['ticks']} ticks, {one['held']} held")
     words += [str(one["given"]), f"{one['cpu_s']} s", *one["wrong"]]
     return "  ".join(words) + (f"  {one['said']}" if isinstance(one["said"], str) and one["said"] else "")
 
@@ -224,6 +234,13 @@ def _figures(shapes: dict[str, dict[str, Any]]) -> list[Figure]:
 
     def gathered(key: str) -> np.ndarray:
         return np.array([x for one in shapes.values() for x in one.get(key, [])], dtype=float)
+
+    if drawn := sum(one.get("ticks", 0) for one in shapes.values()):
+        for key, what in (("jumps", "whose force jumps"), ("held", "that hold the last force")):
+            count = sum(one.get(key, 0) for one in shapes.values())
+            figures.append(
+                Figure(f"ticks {what}, of {drawn}", count).at_most(0 if key == "jumps" else 3e-3 * drawn)
+            )
 
     sizes, hertz, solver = gathered("between_sizes"), gathered("over_hertz") - 1, gathered("over_solver")
     meshed = [one for one in shapes.values() if "sizes_mm" in one]

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
 from palpate.mechanics.compliance.near_field import contact_width
+from palpate.mechanics.compliance.patch import usual_width
 from palpate.mechanics.compliance.sites import (
     contact_curvature,
     patch_width,
@@ -21,7 +22,7 @@ from palpate.mechanics.compliance.sites import (
     uneven_curvature,
 )
 from palpate.mechanics.contact.dent import dent_law
-from palpate.mechanics.contact.edges import ends_within, nearness
+from palpate.mechanics.contact.edges import ends_within, foot_within, nearness
 from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.law_errors import Bound
 from palpate.mechanics.model.model import Model
@@ -204,11 +205,12 @@ def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOpti
 def place_numbers(
     renderer: FemRenderer, tip_radius_m: float, vertices: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
-    """(7, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
+    """(8, k) at k vertices of the contact surface, all unless some are asked for: |curvature| times the tip's
     radius; how far a push along the normal moves the surface sideways (`way_aside`); how near a rim and how
     near the base it is (mechanics.contact.edges.nearness); `uneven_curvature` times the tip's radius; how
     wide a contact is beside a wall (`_through`); how much of a patch that is too wide reaches over rims
-    (`_coarsely`)."""
+    (`_coarsely`); how much of one would lie below the base's outline, times the tip's radius over the patch's
+    width."""
     surface, mesh, parameters = renderer.contact.arrays, renderer.model.mesh, renderer.parameters
     points, normals, far = surface.vertices[vertices], surface.normals[vertices], renderer.far_at(vertices)
     along = np.einsum("vab,vb->va", far, normals)
@@ -220,7 +222,8 @@ def place_numbers(
     wall = _through(renderer.model, points, normals, tip_radius_m)
     coarse = _coarsely(renderer, points, tip_radius_m)
     aside = way_aside(give, sideways, tip_radius_m)
-    return np.stack([bent * tip_radius_m, aside, rim, base, uneven, wall, coarse])
+    foot = foot_within(mesh, points) * tip_radius_m / usual_width(mesh)
+    return np.stack([bent * tip_radius_m, aside, rim, base, uneven, wall, coarse, foot])
 
 
 def thickness_under(
@@ -265,7 +268,7 @@ def way_aside(give: np.ndarray, sideways: np.ndarray, tip_radius_m: float | np.n
 
 
 def rendered_share(renderer: FemRenderer, depth: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (7, ...), place_numbers."""
+    """`law_share` at the renderer's own Poisson's ratio and friction. numbers: (8, ...), place_numbers."""
     given = renderer.parameters
     nu, mu = float(given.poisson_ratio[0]), float(given.friction[0])
     return law_share(depth, *numbers, poisson_ratio=nu, friction=mu)
@@ -280,11 +283,12 @@ def law_share(
     uneven: np.ndarray | float = 0.0,
     wall: np.ndarray | float = 0.0,
     coarse: np.ndarray | float = 0.0,
+    foot: np.ndarray | float = 0.0,
     *,
     poisson_ratio: float = USUAL_POISSON_RATIO,
     friction: float = np.inf,
 ) -> np.ndarray:
-    """Half width of the law's 95 % interval over the force; depth in tip radii, then seven place_numbers;
+    """Half width of the law's 95 % interval over the force; depth in tip radii, then eight place_numbers;
     friction: Coulomb's coefficient."""
     terms = (
         Bound.floor.value,
@@ -296,6 +300,7 @@ def law_share(
         Bound.uneven.value * uneven,
         Bound.wall.value * wall,
         Bound.coarse.value * coarse * np.sqrt(depth),
+        Bound.foot.value * foot * np.sqrt(depth),
         Bound.ratio.value * max(USUAL_POISSON_RATIO - poisson_ratio, 0.0),
         Bound.slip.value * np.exp(-friction / Bound.slippery.value) * depth,
     )

@@ -79,7 +79,7 @@ def leave(state, i):
     """Tip i is in the air: it moves nobody, and its next place counts as new."""
     state.nodes[i, 0] = NOWHERE
     for k in range(3):
-        state.elastic[i, k] = 0.0
+        state.elastic[i, k] = state.quasi[i, k] = 0.0
 
 
 @part

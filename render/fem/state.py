@@ -60,7 +60,8 @@ class FemState(NamedTuple):
     its last solution; edition of the table, and before (1,), the share of the one before that is still felt;
     held (m,) int64, 1 where a tip's force did not settle in this tick; unsolved (v,) int8, 1 where the far
     field of a fine vertex was wanted that is not solved: it was taken for zero, and no force is right from
-    then on. The others are scratch.
+    then on; last (m, 3) m, where the tips were, and way (1,) m, how far they have gone since, together; quasi
+    (m, 3) N, what is rendered of `elastic` (render.fem.kernel). The others are scratch.
     """
 
     forces: np.ndarray
@@ -98,6 +99,9 @@ class FemState(NamedTuple):
     young: np.ndarray
     held: np.ndarray
     unsolved: np.ndarray
+    last: np.ndarray
+    way: np.ndarray
+    quasi: np.ndarray
     base: np.ndarray
     base_triangle: np.ndarray
     base_force: np.ndarray
@@ -138,6 +142,9 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         young=np.zeros(m),
         held=np.zeros(m, dtype=np.int64),
         unsolved=np.zeros(len(parameters.surface.vertices), dtype=np.int8),
+        last=np.zeros((m, 3)),
+        way=np.zeros(1),
+        quasi=np.zeros((m, 3)),
         base=np.zeros((4, 3)),
         base_triangle=np.zeros(1, dtype=np.int64),
         base_force=np.zeros(3),

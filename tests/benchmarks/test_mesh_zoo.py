@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import palpate as pp
 from benchmarks import mesh_zoo
 from benchmarks._zoo_presses import places_of
+from benchmarks._zoo_ticks import jumps
 from benchmarks.mesh_zoo import OUTCOMES, ZOO, _cure, _judge, run, tried
 
 TEN = (
@@ -43,7 +46,7 @@ def test_what_lies_under_a_place_is_the_object_and_not_the_triangle_that_it_is_i
 
 def test_a_stopped_run_goes_on_where_it_was(tmp_path, monkeypatch):
     arguments = argparse.Namespace(
-        only="two blocks touching", first=60, every=1, sizes=1, places=0, solved=0,
+        only="two blocks touching", first=60, every=1, sizes=1, places=0, solved=0, ticks=0,
         work=str(tmp_path / "kept.jsonl"),
     )  # fmt: skip
     first = run(arguments)
@@ -67,6 +70,14 @@ def test_sizes_that_differ_are_wrong_and_it_is_said_what_was_stated_there():
     found |= {"least_force_n": 1.0, "between_sizes": [0.01, -0.03], "stated_share": [0.02, 0.04]}
     _judge(found | {"over_hertz": [], "over_solver": []})
     assert found["wrong"] == ["sizes -0.030 of 0.040 stated"]
+
+
+def test_a_force_that_changes_more_than_the_hand_moves_is_a_jump_and_one_that_ends_is_none():
+    material = SimpleNamespace(young_modulus_pa=20e3, poisson_ratio=0.5)
+    renderer, up = SimpleNamespace(model=SimpleNamespace(material=material)), np.array([0.0, 0.0, 1.0])
+    path = np.array([0.0, 0.0, 1.0, 2.0, 2.0])[:, None] * 1e-4 * up
+    share = jumps(renderer, 5e-3, path, np.array([1.0, 0.5, 0.55, 0.6, 0.0])[:, None] * up)
+    assert share[0] == pytest.approx(0.498) and not share[1:].any()
 
 
 def test_there_are_sixty():
