@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from scipy.special import expit
 
 from palpate.diagnosis.search.leave_one_out import JudgedSet
-from palpate.mechanics.effects.base import Effect
+from palpate.mechanics.effects.base import Effect, Scope
 from palpate.mechanics.law_errors import Unnamed
 
 
@@ -47,8 +47,8 @@ def most_told(effect: Effect, values: np.ndarray, share: float) -> float:
     if effect.hints.untold:
         beyond = (values - effect.ideal) / effect.hints.untold
         most = 0.5 * float(beyond @ beyond)
-    if effect.hints.few_places:
-        return most  # what is wrong with single places is their own error's
+    if effect.hints.few_places or effect.scope is Scope.TIME:
+        return most  # single places have errors of their own, and no elastic law has a loop
     return min(most, 0.5 * (share / Unnamed.alike.value) ** 2)
 
 

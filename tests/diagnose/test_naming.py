@@ -59,6 +59,7 @@ def test_a_clock_that_reads_half_a_sample_late_is_no_delay(search, delay_s, name
         ("skin_layer", 0.002, False),
         ("skin_layer", 0.02, True),
         ("inclusion", 0.002, True),
+        ("viscoelasticity", 0.002, True),
     ],
 )
 def test_what_changes_a_few_thousandths_of_the_force_is_within_our_own_law(name, share, named):
