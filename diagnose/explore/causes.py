@@ -176,8 +176,8 @@ def likeliest(w: Weighing, name: str, least_n: float) -> tuple[Act, float] | Non
 def _evidence(
     w: Weighing, rows: list[int], target: np.ndarray, curve: np.ndarray, sizes_n: np.ndarray, over: float
 ) -> np.ndarray:
-    """Log likelihood ratios to the ideal model of the forms `rows`, each the mean over the spans between sizes
-    (k,) N, both signs where it has both."""
+    """Log likelihood ratios to the ideal model of the forms `rows`, each the mean over a span between
+    sizes (k,) N, both signs where it has both."""
     edges = sizes_n / np.maximum(w.sizes[rows], 1e-9)[:, None]
     curved = curve[rows, None] / over
     signs = (1.0, -1.0) if w.names[rows[0]] in TWO_SIGNED else (1.0,)

@@ -86,7 +86,7 @@ class Patterns:
                     forms.append(form)
         self.own, self.size = np.array(own, dtype=int), np.array(size)
         shown = np.stack(columns, axis=2)
-        # as a score has it: modulus and first touches are where the plain misfit is least, with it and without
+        # as a score has it: modulus and first touches lie where the plain misfit is least
         level = [modulus_share(change[counted], before[counted]) for change in columns[1:]]
         seen = without_first_touches(search, shown[:, :, 1:] - before[:, :, None] * level, plainly=True)
         left = [beside_modulus_n(change[counted], before[counted]) for change in np.moveaxis(seen, 2, 0)]

@@ -80,7 +80,7 @@ def test_what_a_swung_tool_reads_is_no_noise():
 
 
 def test_what_a_tool_that_turns_unseen_wanders_by_is_no_noise():
-    """It is followed straight from one touch to the next; an effect of three times the noise was taken for it."""
+    """It is followed straight from one touch to the next."""
     made = recording(noise=0.005)
     read = 0.1 * np.sin(np.array([0.9, 0.7, 1.1]) * made.t[:, None])
     turned = dataclasses.replace(made, force_on_tool=made.force_on_tool + read)

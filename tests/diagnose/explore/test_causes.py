@@ -89,7 +89,7 @@ def test_the_evidence_of_a_size_is_the_mean_over_it_however_plainly_readings_tel
 
 
 def test_what_explains_as_much_is_as_likely_whatever_its_size_beside_the_grid():
-    """Two forms of one shape, one of another unit: their sizes lie anywhere between two points of the grid."""
+    """A form in several units: its size lies anywhere between two points of the grid."""
     told = []
     for unit in np.geomspace(1.0, SIZES[1], 5):
         gram = np.diag([4e6 + 100.0, 1e3, 1e5 * unit**2])
