@@ -22,6 +22,11 @@ SETTLED_S = 0.5
 """Free air begins this long after the base was traced."""
 _SMOOTH_S = 0.015
 _LET_GO = 0.02
+_LINES = 30
+"""Steps over which an air that wanders runs straight."""
+_MOST_SLOW = 3.2
+"""Times a mean over STEP_S scatters as much as white noise would, at most: as where 30 % of the noise is below
+10 Hz, read at 2 kHz."""
 _MOST_AFTER_S = 0.1
 """A touch is lost so soon after it no longer stands above the noise, or then."""
 
@@ -75,7 +80,7 @@ def measured_noise(
 
     read_n: (n, 3) N, what the air reads beside it: level, drift, and a tool's weight and inertia. None where
     that is followed straight from one touch to the next, as a tool that turns unseen wanders by more than the
-    sensor does: then noise is what a mean differs by from the line through its neighbours.
+    sensor does: then noise is what is left beside lines over 0.3 s.
 
     A recording that was read more slowly than it is sampled ([recording] read_rate_hz) has no more noise
     than its readings had, and that lasts from one reading to the next.
@@ -101,7 +106,7 @@ def measured_noise(
         means = [
             left[a : b - (b - a) % size].reshape(-1, size, left.shape[1]).mean(axis=1) for a, b in runs(free)
         ]
-        apart = [np.diff(each, 2, axis=0) / np.sqrt(6) for each in means]  # as Hadamard's variance has it
+        apart = [_beside_lines(each, _LINES * per_step // size) for each in means]
         for values in [apart, means] if read_n is None else [means]:
             if sum(map(len, values)) > 20:
                 return _robust_std(np.concatenate(values))
@@ -110,9 +115,18 @@ def measured_noise(
     step = max(of_means(per_step), white / np.sqrt(per_step))
     inflation = of_means(10 * per_step) ** 2 * 10 / step**2
     # a hand that accelerates a heavy tool is no noise: what exceeds these is left for the diagnosis to find
-    step = min(step, 2.2 * white / np.sqrt(per_step))
+    step = min(step, _MOST_SLOW * white / np.sqrt(per_step))
     raw = np.sqrt(white**2 * (1 - 1 / per_step) + step**2)
     return Noise(float(raw), float(step), float(np.clip(inflation, 1.0, 10.0)))
+
+
+def _beside_lines(means: np.ndarray, count: int) -> np.ndarray:
+    """(k, c) what means (m, c) differ by from a line through each `count` of them, as loud as they are."""
+    windows = means[: len(means) - len(means) % count].reshape(-1, count, means.shape[1])
+    at = np.arange(count) - 0.5 * (count - 1)
+    slope = np.einsum("n,wnc->wc", at, windows) / (at @ at)
+    left = windows - windows.mean(axis=1, keepdims=True) - at[None, :, None] * slope[:, None]
+    return left.reshape(-1, means.shape[1]) * np.sqrt(count / (count - 2))
 
 
 def _held(recording: Recording) -> int:

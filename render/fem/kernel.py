@@ -90,8 +90,9 @@ def _force(p, state, i, depth):
 
 SNAP_S = 0.02
 """In which most of a snap is rendered: a body of its own inertia takes some ms, and no hand is kicked."""
-_STIFFEST, _LEFT = 4.0, 2e-3
-"""Twice a dent's as wide as the tip, over E* and radius; of the force, what slip leaves open."""
+_STIFFEST, _LEFT, _UNFELT_N = 4.0, 2e-3, 0.01
+"""Twice a dent's as wide as the tip, over E* and radius; of the force, what slip leaves open; N, a step that no
+hand feels."""
 
 
 @part
@@ -109,7 +110,7 @@ def _come(state, i):
     if tangent > 0.0:  # a base close below is felt harder than a half-space
         give = max(1.0 / tangent + state.local_far[i, 0, 0], 0.25 / tangent)
         stiffest = max(stiffest, 1.25 / give)
-    explained = stiffest * state.way[0] + _LEFT * np.sqrt(size)
+    explained = stiffest * state.way[0] + _LEFT * np.sqrt(size) + _UNFELT_N
     share = 1.0
     if change > explained and size > 0.0:
         share = min(explained / change + state.dt_s[0] / SNAP_S, 1.0)

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from palpate.mechanics.errors import ModelError
 from palpate.mechanics.model.files import read_presses, write_csv, write_presses
@@ -88,6 +89,20 @@ def test_what_a_tool_that_turns_unseen_wanders_by_is_no_noise():
     assert noise.raw_n == pytest.approx(0.005, rel=0.05)
     assert noise.step_n == pytest.approx(0.005 / np.sqrt(10), rel=0.15)
     assert noise.variance_inflation < 2.0
+
+
+@pytest.mark.parametrize("followed", [False, True])
+def test_slow_noise_is_noise(followed):
+    """30 % of its power below 10 Hz, read at 2 kHz: a sound object was nearly unknown by what was taken off."""
+    made = recording(noise=0.01 * np.sqrt(0.7), rate=2000.0)
+    memory = np.exp(-2 * np.pi * 10.0 / 2000.0)
+    steps = np.random.default_rng(3).standard_normal(made.position.shape) * np.sqrt(1 - memory**2)
+    slow = 0.01 * np.sqrt(0.3) * lfilter([1.0], [1.0, -memory], steps, axis=0)
+    read = np.zeros_like(slow)
+    noisy = dataclasses.replace(made, force_on_tool=made.force_on_tool + slow)
+    noise = table(noisy, free_air=read, followed=followed).noise
+    assert noise.raw_n == pytest.approx(0.01, rel=0.1)
+    assert noise.step_n == pytest.approx(0.01 * np.sqrt(0.3 + 0.7 / 20), rel=0.15)
 
 
 def test_rows_are_seen_from_the_place_that_was_touched():
