@@ -25,8 +25,8 @@ _LET_GO = 0.02
 _LINES = 30
 """Steps over which an air that wanders runs straight."""
 _MOST_SLOW = 3.2
-"""Times a mean over STEP_S scatters as much as white noise would, at most: as where 30 % of the noise is below
-10 Hz, read at 2 kHz."""
+"""Times a mean over STEP_S scatters as much as white noise would, at most: as where 30 % of the noise is
+below 10 Hz, read at 2 kHz."""
 _MOST_AFTER_S = 0.1
 """A touch is lost so soon after it no longer stands above the noise, or then."""
 

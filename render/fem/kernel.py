@@ -91,8 +91,8 @@ def _force(p, state, i, depth):
 SNAP_S = 0.02
 """In which most of a snap is rendered: a body of its own inertia takes some ms, and no hand is kicked."""
 _STIFFEST, _LEFT, _UNFELT_N = 4.0, 2e-3, 0.01
-"""Twice a dent's as wide as the tip, over E* and radius; of the force, what slip leaves open; N, a step that no
-hand feels."""
+"""Twice a dent's as wide as the tip, over E* and radius; of the force, what slip leaves open; N, a step that
+no hand feels."""
 
 
 @part
