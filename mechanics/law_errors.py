@@ -198,10 +198,10 @@ class Unnamed:
         "lack of fit above 0.95 by it, and none is given a cause",
     )  # fmt: skip
     alike = OwnError(
-        0.0014, "1", "force in proportion to itself, in a form without a loop that bends the law of all "
+        0.0018, "1", "force in proportion to itself, in a form without a loop that bends the law of all "
         "presses alike", "all places",
         "what is not there changes the force of sound objects by 0.2 % (17 nats, a silicone of another "
-        "simulator) to 0.6 % (9 nats, a dome of the laboratory); by this width 0.6 % hold 9 nats",
+        "simulator) to 0.7 % (13 nats, a sphere's cap of the laboratory); by this width 0.7 % hold 8 nats",
     )  # fmt: skip
     along = OwnError(
         6.25, "1", "variance of that share in a sum along a press, over that of one anew at each sample",
