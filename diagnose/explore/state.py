@@ -72,6 +72,11 @@ class ExplorationState:
 
     @property
     def words(self) -> str:
+        """How far each goal is, and what was asked for."""
+        return self.reached + (f" (asked: {self.asked})" if self.asked else "")
+
+    @property
+    def reached(self) -> str:
         """How far each goal is."""
         parts = []
         for goal in self.goals:
@@ -84,7 +89,7 @@ class ExplorationState:
                 parts.append(f"modulus {self.modulus_pa / 1e3:.1f} kPa within {100 * goal.now:.1f} %")
             else:
                 parts.append(f"95 % of the surface within {1e3 * goal.now:.2f} mm")
-        return ", ".join(parts) + (f" (asked: {self.asked})" if self.asked else "")
+        return ", ".join(parts)
 
 
 def cause_goal(causes: Causes | None, at: float) -> GoalState:

@@ -24,7 +24,7 @@ from palpate.diagnosis.instrument.support_readings import rigid_of
 from palpate.diagnosis.options import NuisanceOptions
 from palpate.diagnosis.search.descent import first_touches, fit
 from palpate.diagnosis.search.fit import Fit, settings_of
-from palpate.diagnosis.search.gaps import modulus_share
+from palpate.diagnosis.search.gaps import beside_modulus_n
 from palpate.diagnosis.search.site_stiffness import surface_error
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.compliance.far_field import energy_fields
@@ -47,7 +47,6 @@ from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.statistics import squared_exponential
 from palpate.reconstruction.steps.s5_mesh.meshing import uncertainty_at
-from palpate.render.replay import rms_n
 
 Act = Callable[[ForwardSettings, Forward], None]
 """Sets one form of a cause in a prediction."""
@@ -200,7 +199,7 @@ def weigh(estimate: ExplorationEstimate) -> Weighing | None:
     gram = whitener.gram(columns).sum(axis=0)
     counted = forward.touches.counted
     plain = before[counted]
-    sizes = np.array([_size(c[counted], plain) for c in changes])
+    sizes = np.array([beside_modulus_n(c[counted], plain) for c in changes])
     dof = 3.0 * float(counted.sum())
     return Weighing(
         forward, whitener, found, tuple(acts), tuple(names), sizes, gram, len(own), dof, site_sd,
@@ -243,10 +242,6 @@ def changed(forward: Forward, found: Fit, act: Act | None) -> np.ndarray:
     if act is not None:
         act(settings, forward)
     return np.nan_to_num(forward.predict(settings))
-
-
-def _size(change: np.ndarray, plain: np.ndarray) -> float:
-    return rms_n(change - modulus_share(change, plain) * plain)
 
 
 def forward_of(estimate: ExplorationEstimate) -> tuple[Forward, np.ndarray] | None:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from palpate.render.replay import rms_n
+
 RESAMPLES = 400
 
 
@@ -21,8 +23,7 @@ def modulus_share(change: np.ndarray, force: np.ndarray) -> float:
 
 def beside_modulus_n(change: np.ndarray, force: np.ndarray) -> float:
     """N, rms of a change (n, 3) of a force (n, 3) N, with what another modulus takes up left out."""
-    own = change - modulus_share(change, force) * force
-    return float(np.sqrt((own**2).sum(axis=1).mean()))
+    return rms_n(change - modulus_share(change, force) * force)
 
 
 def closed_share(

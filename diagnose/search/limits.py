@@ -257,10 +257,12 @@ def without_first_touches(search: Search, changes: np.ndarray, *, plainly: bool 
     of_rank = rank[t.press][:, None] == np.arange(rank.max() + 1)
     each = column[:, :, None] * of_rank[:, None, :]
     both = np.concatenate([each, changes], axis=2)
-    gram, k = whitener.gram(both), each.shape[2]
+    k = each.shape[2]
     if plainly:
         gram = whitener.raw_gram(both) / whitener.variance
         gram[t.site, rank, rank] += 1 / whitener.onset_sd**2
+    else:
+        gram = whitener.gram(both)
     taken = np.linalg.pinv(gram[:, :k, :k], hermitian=True) @ gram[:, :k, k:]
     moved: np.ndarray = np.einsum("nrk,nkc->nrc", each, taken[t.site[t.press]])
     return changes - moved

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.patch import usual_width
-from palpate.mechanics.shape.nearest import distance, triangle_areas
+from palpate.mechanics.shape.nearest import distance, segments_cut, triangle_areas
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 RIMS, BASE, INVERSE_SQUARE = 0, 1, 2
@@ -77,12 +77,8 @@ def foot_within(mesh: TetMesh, points: np.ndarray) -> np.ndarray:
     pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     ends, count = np.unique(pairs, axis=0, return_counts=True)
     a, b = mesh.points[ends[count == 1].T]
-    length = np.linalg.norm(b - a, axis=1)
-    parts = np.maximum(np.ceil(length / (_STEP * sigma)).astype(int), 1)
-    edge = np.repeat(np.arange(len(parts)), parts)
-    share = (np.arange(len(edge)) - np.repeat(np.cumsum(parts) - parts, parts) + 0.5) / parts[edge]
-    samples = a[edge] + share[:, None] * (b - a)[edge]
-    return _summed(points, samples, (length / parts)[edge] / (np.sqrt(2 * np.pi) * sigma), sigma)
+    middles, length, _ = segments_cut(a, b, _STEP * sigma)
+    return _summed(points, middles, length / (np.sqrt(2 * np.pi) * sigma), sigma)
 
 
 def ends_within(mesh: TetMesh, points: np.ndarray, width_m: float) -> np.ndarray:

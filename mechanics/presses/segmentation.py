@@ -101,13 +101,14 @@ def measured_noise(
     left = force if read_n is None else force - read_n[:, axes]
     line = np.polyfit(recording.t[free], left[free], 1)
     left = left - (recording.t[:, None] * line[0] + line[1])
+    stretches = [left[a:b] for a, b in runs(free)]
 
     def of_means(size: int) -> float:
-        means = [
-            left[a : b - (b - a) % size].reshape(-1, size, left.shape[1]).mean(axis=1) for a, b in runs(free)
-        ]
-        apart = [_beside_lines(each, _LINES * per_step // size) for each in means]
-        for values in [apart, means] if read_n is None else [means]:
+        means = [x[: len(x) - len(x) % size].reshape(-1, size, x.shape[1]).mean(axis=1) for x in stretches]
+        told = [means]
+        if read_n is None:
+            told.insert(0, [_beside_lines(each, _LINES * per_step // size) for each in means])
+        for values in told:
             if sum(map(len, values)) > 20:
                 return _robust_std(np.concatenate(values))
         return white / np.sqrt(size)

@@ -7,6 +7,18 @@ from typing import Any, cast
 import numpy as np
 
 
+def segments_cut(
+    start: np.ndarray, end: np.ndarray, longest_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pieces of at most `longest_m` of segments from start to end (s, 3) m: their middles (k, 3) m, lengths
+    (k,) m, and of which segment each is (k,)."""
+    length = np.linalg.norm(end - start, axis=1)
+    count = np.maximum(np.ceil(length / longest_m).astype(int), 1)
+    row = np.repeat(np.arange(len(count)), count)
+    share = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
+    return start[row] + share[:, None] * (end - start)[row], (length / count)[row], row
+
+
 def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(k,) m^2, of straight triangles (k, 3 or 6) of points (n, 3) m."""
     return np.linalg.norm(facings(points, triangles)[0], axis=1) / 2

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.disk.store import content_key
 from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.shape.creases import Facets, angle_between, corner_normals_of, facets_of
-from palpate.mechanics.shape.nearest import closest, triangle_areas
+from palpate.mechanics.shape.nearest import closest, segments_cut, triangle_areas
 
 _SAME_SIDE = np.cos(np.radians(50))
 _FACING = np.cos(np.radians(75))
@@ -84,13 +84,9 @@ class TrueShape:
         start, end = (self.vertices[self.triangles[triangle, (edge + k) % 3]] for k in (0, 1))
         own, other = facets.unit[triangle], facets.unit[facets.across[triangle, edge]]
         convex = np.einsum("kx,kx->k", np.cross(own, other), end - start)
-        length = np.linalg.norm(end - start, axis=1)
-        count = np.maximum(np.ceil(length / longest_m).astype(int), 1)
-        row = np.repeat(np.arange(len(triangle)), count)
-        share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
-        middles = start[row] + share[:, None] * (end - start)[row]
+        middles, length, row = segments_cut(start, end, longest_m)
         turn = np.copysign(angle_between(own, other), convex)
-        return middles, (length / count)[row], turn[row]
+        return middles, length, turn[row]
 
     def on(self, triangle: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from palpate.diagnosis.explore.state import ExplorationState
 from palpate.diagnosis.explore.suggestion import Explored, Step
 from palpate.show import story as say
 from palpate.show.colours import COLOURS
@@ -32,7 +31,7 @@ def story(result: Explored) -> say.Story:
     how = f"{'ended' if result.last.kind == 'stop' else 'not ended, next'}: {result.last.why}"
     made = f"{state.made} presses in {state.seconds:.0f} s"
     yield say.Headline(f"{made}: {state.words or 'nothing is known yet'}", on=say.TEXT)
-    yield say.Headline(f"{made}: {_reached(state) or 'nothing is known yet'}", on=say.PAGE)
+    yield say.Headline(f"{made}: {state.reached or 'nothing is known yet'}", on=say.PAGE)
     yield say.Detail(how, on=say.TEXT)
     soft = np.isfinite(state.modulus_pa)
     soft_words = f"About as soft as {softness(state.modulus_pa)}. " if soft else ""
@@ -155,14 +154,9 @@ def _goal(name: str, value: float) -> str:
 
 def _rows(result: Explored) -> list[list[object]]:
     return [
-        [k, "made before" if s.asked is None else s.asked.why, s.state.trouble or _reached(s.state) or "-"]
+        [k, "made before" if s.asked is None else s.asked.why, s.state.trouble or s.state.reached or "-"]
         for k, s in enumerate(result.steps, 1)
     ]
-
-
-def _reached(state: ExplorationState) -> str:
-    """What is known, without what was asked for: a table says that."""
-    return state.words.removesuffix(f" (asked: {state.asked})")
 
 
 def _draw_places(result: Explored, ax: Axes) -> None:
