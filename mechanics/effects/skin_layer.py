@@ -1,15 +1,19 @@
-"""A skin of another stiffness: the dent feels it by the share of its strain that lies in the film.
+"""A skin of another stiffness: a dent feels it as a layer bonded to a half-space, by the contact's radius.
 
-The modulus under a contact of radius a is E ratio^w(thickness / a), w Gao's weight of a film (Gao, Chiu & Lee
-1992), 0 for a thin and 1 for a thick one: stiff at first touch, less so deeper. How the skin holds the whole
-object together is in the far field, by mechanics.model.material.skin_ratio.
+The modulus under a contact of radius a is E k(a / thickness), k exact for a flat punch without friction:
+modulus_ratio for a small contact, 1 for a wide one: a stiff skin is stiff at first touch and less so deeper.
+The layer's response to a wave of the load is in closed form (Burmister 1945; O'Sullivan & King 1988), the
+punch's integral equation is solved by quadrature. How the skin holds the whole object together is in the far
+field, by mechanics.model.material.skin_ratio.
 """
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
 from palpate.mechanics.contact.dent import grid
@@ -19,21 +23,50 @@ from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, To
 from palpate.mechanics.model.material import SKIN, Skin
 from palpate.mechanics.model.model import Model
 
+_RADII = np.geomspace(0.02, 20.0, 32)
+"""Contact radii, in thicknesses, at which a punch is solved; what a skin adds to wider ones falls with the
+radius."""
+_WAVES, _PARTS = 12.0, (48, 400)
+"""Wavenumber times thickness above which a load feels the layer alone; points of the quadratures over the
+punch and over the waves."""
 
-def film_weight(thickness_over_contact: np.ndarray, poisson_ratio: float) -> np.ndarray:
-    """Gao's I0: share of the film in the modulus under a contact, 0 thin to 1 thick."""
-    x = np.maximum(thickness_over_contact, 1e-9)
-    return 2 / np.pi * np.arctan(x) + (
-        (1 - 2 * poisson_ratio) * x * np.log((1 + x * x) / (x * x)) - x / (1 + x * x)
-    ) / (2 * np.pi * (1 - poisson_ratio))
+
+def layer_softness(wave: np.ndarray, modulus_ratio: float, poisson_ratio: float) -> np.ndarray:
+    """Normal displacement under a load of these wavenumbers, times thickness, over that of a half-space of
+    the layer's own material: 1 for short waves, modulus_ratio for long ones."""
+    b = 3 - 4 * poisson_ratio
+    one, two = 1 - (1 + b) / (1 + modulus_ratio * b), (modulus_ratio - 1) / (modulus_ratio + b)
+    decay = np.exp(-2 * wave)
+    above = 1 + 4 * wave * two * decay - one * two * decay**2
+    return np.asarray(above / (1 - (one + two + 4 * two * wave**2) * decay + one * two * decay**2))
+
+
+@lru_cache(maxsize=1)
+def _waves() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Places on a punch and their weights, waves, and (radius, place, wave) cosines, by the wave's weight."""
+    (place, weight), (wave, share) = (np.polynomial.legendre.leggauss(n) for n in _PARTS)
+    place, wave = 0.5 * (place + 1), 0.5 * (wave + 1) * _WAVES
+    cosines = np.cos(_RADII[:, None, None] * place[:, None] * wave)
+    return 0.5 * weight, wave, cosines, 0.5 * share * _WAVES
+
+
+@lru_cache(maxsize=64)
+def _punch(modulus_ratio: float, poisson_ratio: float) -> CubicSpline:
+    """The modulus under a punch over that of the half-space, by the logarithm of _RADII."""
+    weight, wave, cosines, share = _waves()
+    beyond = (layer_softness(wave, modulus_ratio, poisson_ratio) - 1) * share
+    kernel = 2 / np.pi * _RADII[:, None, None] * ((cosines * beyond) @ cosines.transpose(0, 2, 1))
+    load = np.linalg.solve(np.eye(len(weight)) + kernel * weight, np.ones((len(weight), 1)))[..., 0]
+    return CubicSpline(np.log(_RADII), modulus_ratio * (load @ weight))
 
 
 def film_factor(
     contact_radius_m: np.ndarray, thickness_m: float, modulus_ratio: float, poisson_ratio: float
 ) -> np.ndarray:
     """Modulus under contacts of these radii over that of the object without its skin."""
-    weight = film_weight(thickness_m / np.maximum(contact_radius_m, 1e-6), poisson_ratio)
-    return modulus_ratio**weight
+    wide = np.maximum(contact_radius_m / thickness_m, _RADII[0])
+    solved = np.minimum(wide, _RADII[-1])
+    return np.asarray(1 + (_punch(modulus_ratio, poisson_ratio)(np.log(solved)) - 1) * solved / wide)
 
 
 def _set(touch: TouchTerms, skin: Skin, model: Model) -> None:
