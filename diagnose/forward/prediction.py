@@ -19,7 +19,8 @@ from palpate.mechanics.compliance.pressed_places import Places, solve_places
 from palpate.mechanics.contact.dent import bend_of, effective_radius
 from palpate.mechanics.contact.touch import TouchedPlaces
 from palpate.mechanics.effects.laws_along_path import new_memory, path_numbers
-from palpate.mechanics.effects.settings import ForwardSettings
+from palpate.mechanics.effects.settings import ForwardSettings, TouchTerms
+from palpate.mechanics.effects.skin_layer import beneath_skin
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.press_solver.press import LAWS
 from palpate.mechanics.press_solver.solved_places import ExactPresses, PlacesToSolve, solve_touched
@@ -109,16 +110,18 @@ class Forward:
         return self.touches.quaternion
 
     def ideal(self, modulus: float) -> ForwardSettings:
-        """Settings of the ideal model."""
-        p = len(self.touches)
+        """Settings of the ideal model, with what it has under the tips."""
+        p, soft, touch = len(self.touches), self.places.softness, TouchTerms()
+        beneath_skin(touch, self.model)
         return ForwardSettings(
             modulus=modulus,
             nu=self.model.material.poisson_ratio,
             far=self.places.far,
             bracing=self.places.bracing,
-            dent_ratio=np.ones(p),
+            dent_ratio=np.ones(p) if soft is None else 1 / soft,
             onset=np.zeros(p),
             stiffness=np.ones(p),
+            touch=touch,
         )
 
     def predict(self, s: ForwardSettings) -> np.ndarray:

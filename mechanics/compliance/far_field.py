@@ -34,8 +34,8 @@ class EnergyFields:
     """energy: (q, m, 3, 3) of q places, local frames, unit modulus, 1/m. centroid: (m, 3) m, device frame.
 
     volume: (m,) m^3. depth: (m,) m, distance of the centroid to the touchable surface. half_space: (3, 3)
-    taken off the sum, local frame. solver: of the model's own mesh, bonded. solution: (n, 3, 3 q) its nodal
-    displacements for the unit loads.
+    taken off the sum, local frame, under a patch of width_m, m. solver: of the model's own mesh, bonded.
+    solution: (n, 3, 3 q) its nodal displacements for the unit loads.
     """
 
     energy: np.ndarray
@@ -43,6 +43,7 @@ class EnergyFields:
     volume: np.ndarray
     depth: np.ndarray
     half_space: np.ndarray
+    width_m: float
     solver: Solver
     solution: np.ndarray
 
@@ -106,7 +107,7 @@ def _energies(places: Places) -> EnergyFields:
     centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
     depth = cKDTree(sampler._positions.reshape(-1, 3)).query(centroid)[0]
     half = half_space_compliance(np.array([1.0, 0, 0]), model.material.poisson_ratio, sampler.width_m)
-    return EnergyFields(energy, centroid, mesh.volumes, depth, half, solver, u)
+    return EnergyFields(energy, centroid, mesh.volumes, depth, half, sampler.width_m, solver, u)
 
 
 def far_with_weights(places: Places, softness: np.ndarray) -> np.ndarray:

@@ -73,24 +73,6 @@ def surface_softness(
     return np.array([sampler.triangle_mean(point, softness) for point in points])
 
 
-def sharpening(
-    solver: Solver,
-    points: np.ndarray,
-    patch_width_m: float,
-    tip_radius_m: float = USUAL_TIP_RADIUS_M,
-    progress: Progress = silent,
-) -> np.ndarray:
-    """(k, 3, 3) 1/m: to add to the compliance of places (k, 3) under their patches, unit modulus, for what
-    varies under a contact of the usual depth. Zero for an object of one modulus, and where first-order
-    energies say that it does not matter; elsewhere it costs `solver.plain` and twelve solves a place."""
-    result = np.zeros((len(points), 3, 3))
-    narrow = contact_width(tip_radius_m)
-    if narrow < patch_width_m:
-        felt, _, (wide, sharp) = _changes(solver, points, (patch_width_m, narrow), progress)
-        result[felt] = sharp - wide
-    return result
-
-
 def ball_law(
     solver: Solver,
     points: np.ndarray,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from palpate.mechanics.compliance.local_material import given_back
 from palpate.mechanics.compliance.near_field import contact_width
 from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, touch_sites, touch_solver
@@ -30,8 +31,9 @@ class Places:
     """p presses on a model; device frame, SI units.
 
     point, normal: (p, 3). frame: (p, 3, 3) rows normal, tangent, tangent. far: (p, 3, 3) far field in those
-    frames, unit modulus, 1/m. curvature, bracing, braced: (p,) 1/m (TouchSites). stages: what effects asked
-    to compute, by name.
+    frames, unit modulus, 1/m. curvature, bracing, braced: (p,) 1/m (TouchSites). softness: (p,) of the
+    material under each tip (local_material.given_back), 1 where None. stages: what effects asked to compute,
+    by name.
     """
 
     model: Model
@@ -42,6 +44,7 @@ class Places:
     curvature: np.ndarray
     bracing: np.ndarray
     braced: np.ndarray
+    softness: np.ndarray | None = None
     stages: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -74,7 +77,7 @@ class Places:
         """Those of some presses (p,) bool; stages are computed anew where any is left out."""
         if presses.all():
             return self
-        own = ("point", "normal", "frame", "far", *BENT_BY)
+        own = ["point", "normal", "frame", "far", *BENT_BY, *([] if self.softness is None else ["softness"])]
         return replace(self, **{name: getattr(self, name)[presses] for name in own}, stages={})
 
     def stored(self, name: str, build: Callable[[], Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
@@ -105,12 +108,16 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
             stages[UNIFORM] = solver
         patch = LoadPatch(tip_radius_m=model.tool.tip_radius_m, balls=True) if balls else LoadPatch()
         sites = touch_sites(mesh, point[first], normal[first], nu, solver=solver, patch=patch)
-        return {name: getattr(sites, name) for name in ("far", *BENT_BY)}
+        solved = {name: getattr(sites, name) for name in ("far", *BENT_BY)}
+        if ratio is None:
+            return solved
+        softness, back = given_back(model, point[first], normal[first], sites.patch_width_m)
+        return {**solved, "far": sites.far + back, "softness": softness}
 
     sites = _stored("sites", model, point, normal, solve)
     far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][place], frame)
-    bent = {name: sites[name][place] for name in BENT_BY}
-    return Places(model, point, normal, frame, np.ascontiguousarray(far), **bent, stages=stages)
+    rest = {name: each[place] for name, each in sites.items() if name != "far"}
+    return Places(model, point, normal, frame, np.ascontiguousarray(far), **rest, stages=stages)
 
 
 def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
@@ -136,11 +143,12 @@ def _stored(
 ) -> dict[str, np.ndarray]:
     """A stage depends on shape and places alone: keyed by their content. Damaged files are built anew."""
     path = None if model.path is None else model.path / f"diagnosis-{name}.cache"
-    mesh = model.mesh
+    mesh, skin = model.mesh, model.material.skin
     key = content_key(
         name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, model.element_ratio,
         "" if mesh.shape is None else mesh.shape.key,
         model.material.poisson_ratio, point, normal,
-        *([model.tool.tip_radius_m] if model.material.inclusions else []),
+        *([model.tool.tip_radius_m] if np.ptp(model.element_ratio) > 0 else []),
+        *([] if skin is None else [skin.thickness_m, skin.modulus_ratio]),
     )  # fmt: skip
     return load_or_build(path, key, build)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.compression import own_blocks
-from palpate.mechanics.compliance.near_field import ball_law, contact_width, sharpening
+from palpate.mechanics.compliance.near_field import ball_law, contact_width
 from palpate.mechanics.compliance.patch import half_space_compliance, usual_width
 from palpate.mechanics.contact.dent import ellipse_curvature
 from palpate.mechanics.contact.depth_factors import DepthFactors
@@ -242,8 +242,6 @@ def touch_sites(
     if patch.balls:
         by_balls = ball_law(solver, points, normals, width, patch.tip_radius_m)
         far, bracing = far + by_balls.far, by_balls.bracing
-    else:
-        far += sharpening(solver, points, width, patch.tip_radius_m)
     far -= half_space_compliance(normals, poisson_ratio, width)
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
-from palpate.mechanics.compliance.near_field import surface_softness
+from palpate.mechanics.compliance.local_material import given_back
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
-from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import contact_curvature
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.contact.dent import DentLaw
@@ -29,22 +28,19 @@ class FineSurface:
 
     bracing: (v,) 1/m, by which rims, the base (mechanics.contact.edges) and balls
     (mechanics.compliance.near_field) bend the dent's law.
-    softness: (v,) of the material under a tip, global modulus over its own. parents: (k, 3) numbers of each
-    fine triangle's mesh corners among the compliance's, -1 on the base. law: of the dent.
-
-    What is local is the dent's, which goes with the modulus under the tip: where that is not the global one,
-    the half-space that the compliance takes off is of the wrong modulus, and the difference is given back.
+    softness: (v,) of the material under a tip (mechanics.compliance.local_material). parents: (k, 3) numbers
+    of each fine triangle's mesh corners among the compliance's, -1 on the base. law: of the dent.
     """
 
     def __init__(self, model: Model, surface: ContactSurface, compliance: Compliance, law: DentLaw) -> None:
-        arrays, mesh, nu = surface.arrays, model.mesh, model.material.poisson_ratio
+        arrays, mesh = surface.arrays, model.mesh
         number = np.full(int(max(surface.parents.max(), compliance.nodes.max())) + 1, -1, dtype=np.int64)
         number[compliance.nodes] = np.arange(len(compliance.nodes))
         self.parents = np.ascontiguousarray(number[surface.parents])
         self._model, self._vertices, self._normals = model, arrays.vertices, arrays.normals
         self._touched = touched = np.unique(arrays.triangles[arrays.free > 0])
         points, normals = arrays.vertices[touched], arrays.normals[touched]
-        v, tip = len(arrays.vertices), model.tool.tip_radius_m
+        v = len(arrays.vertices)
         self.far, self._added = np.zeros((v, 3, 3)), np.zeros((v, 3, 3))
         self.curvature, self.bracing, self.softness = np.zeros(v), np.zeros(v), np.ones(v)
         self._rims = np.zeros(v)
@@ -53,10 +49,8 @@ class FineSurface:
         self.bracing[touched] = missed.bracing + law.braced * missed.braced
         self._without_balls = np.array(self.bracing)
         self._rims[touched] = missed.curvature
-        self.softness[touched] = surface_softness(mesh, model.surface_ratio, points, tip)
-        width = float(compliance.own_width_m[0])
-        for k in touched[self.softness[touched] != 1]:
-            self._added[k] += (1 - self.softness[k]) * half_space_compliance(arrays.normals[k], nu, width)
+        self.softness[touched], back = given_back(model, points, normals, float(compliance.own_width_m[0]))
+        self._added[touched] += back
         if mesh.shape is None:  # all are fitted at once: each is the same only among the same
             bent = _curvature(model, points, normals)
             self.curvature[touched] = bent + missed.curvature

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from palpate.mechanics.effects.skin_layer import film_factor
+from palpate.mechanics.compliance.local_material import punch_factor
 from palpate.mechanics.elastic.elasticity import stiffness
 from palpate.mechanics.elastic.pardiso import Pardiso, available
+from palpate.mechanics.model.material import Skin
 from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 
 from .closed_forms import boussinesq_displacement, flat_punch_force
@@ -73,6 +74,6 @@ def test_flat_punch_converges_to_the_half_space():
 @pytest.mark.parametrize("modulus_ratio", [0.4, 5.0])
 @pytest.mark.parametrize("thickness", [0.5 * A, A])
 def test_a_punch_feels_a_skin_as_elements_do(thickness: float, modulus_ratio: float):
-    stated = float(film_factor(np.array([A]), thickness, modulus_ratio, NU)[0])
+    stated = float(punch_factor(np.array([A]), Skin(thickness, modulus_ratio), NU)[0])
     felt = punch_force(2, (thickness, modulus_ratio), far=stated) / punch_force(2)
     assert felt == pytest.approx(stated, rel=0.02)
