@@ -109,6 +109,26 @@ def test_beside_a_rim_a_small_tip_feels_the_face_and_not_the_rim():
     assert straight[0] > 0.0015 and straight[1] < 0.0005
 
 
+def test_a_rim_beside_a_hollow_keeps_its_place():
+    """A terrace of 6 mm on a disc: its rim was rounded as its foot is, 0.5 mm off, and felt far too late."""
+    profile = np.array([[0.030, 0.0], [0.030, 0.020], [0.013, 0.020], [0.010, 0.026]])
+    shape = turned_on_a_lathe(profile)
+    mesh = shapes.cylinder(0.030, 0.026, (12, 7), order=1)
+    points = mesh.points.copy()
+    top = np.interp(np.hypot(*points[:, :2].T), profile[::-1, 0], profile[::-1, 1], right=0.020)
+    points[:, 2] *= np.where(np.hypot(*points[:, :2].T) < 0.0295, top, 0.020) / 0.026
+    felt = contact_surface(TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable, shape)).arrays
+    used = np.unique(felt.triangles[felt.free > 0])
+    r, z = np.hypot(*felt.vertices[used, :2].T), felt.vertices[used, 2]
+    off = np.abs(shape.distance(felt.vertices[used]))
+    assert (z > 0.0255).sum() > 40
+    assert off[z > 0.0255].max() < 3e-5
+    flat = (r < 0.0075) & (z > 0.02)
+    assert felt.normals[used][flat, 2].min() > 1 - 1e-6
+    foot = np.hypot(r - 0.013, z - 0.020) < 0.002
+    assert off[foot].max() > 2e-4  # of which a tip that sticks shall not snap
+
+
 def test_a_crease_that_fades_leaves_no_triangle_without_area_and_no_normal_without_length():
     """A block with a roof on it: several fine vertices have the same end of its ridge as nearest crease."""
 
