@@ -143,22 +143,19 @@ def on_shape(
     creased[rim] = False  # no tip gets under it
     if not creased.any() or edge > 2 * EDGE_ROUNDING_M:
         return OnShape(placed, normals, triangles, np.arange(len(triangles)), weights)
-    hollows = _hollows(shape)
-    hollow = creased & _beside(hollows, placed)
-    sharp = creased & ~hollow
-    if hollow.any():
-        own = np.setdiff1d(used, rim)
-        placed, normals = _eased(placed, normals, touch, own, cKDTree(placed[hollow]))
+    creases = _creases(shape)
+    sharp = creased & ~creases.hollow(placed)
+    if creases.hollows.n:
+        placed, normals = _eased(placed, normals, touch, np.setdiff1d(used, rim), creases)
     if not sharp.any():
         return OnShape(placed, normals, triangles, np.arange(len(triangles)), weights)
-    line = _line(shape, placed[sharp], placed[rim])
+    line = _line(shape, creases, placed[sharp], placed[rim])
     before = len(placed)
     placed, triangles, within, weights = cut_beside(placed, triangles, free, weights, sharp, line, strip_m)
     placed[before:], facing = shape.foot(placed[before:])
     normals = np.vstack([normals, facing])
     own = np.setdiff1d(triangles[free[within] > 0], rim)
-    if hollow.any():
-        own = own[~_beside(hollows, placed[own])]
+    own = own[~creases.hollow(placed[own])]
     rims = np.flatnonzero(sharp)
     between = pseudonormals(placed, triangles)[rims]
     away = line.query(placed[own], distance_upper_bound=strip_m)[0]
@@ -181,23 +178,39 @@ def _of_side(placed: np.ndarray, normals: np.ndarray, touch: np.ndarray) -> np.n
     return np.where(other[:, None], side, normals)
 
 
-def _line(shape: TrueShape, rims: np.ndarray, base: np.ndarray) -> cKDTree:
-    """Points along those creases that are nearer to vertices `rims` (r, 3) than to the base's."""
+class _Creases(NamedTuple):
+    """Points along the concave creases and along the convex ones; either may have none."""
+
+    hollows: cKDTree
+    rims: cKDTree
+
+    def share(self, points: np.ndarray) -> np.ndarray:
+        """(v,) of how much they are a hollow's: 1 where one is as near as any rim, 0 on a rim and where none
+        is near."""
+        hollow = self.hollows.query(points, distance_upper_bound=_HOLLOW_REACH_M)[0]
+        near = np.isfinite(hollow)
+        rim = self.rims.query(points[near])[0]
+        share = np.zeros(len(points))
+        share[near] = np.minimum(2 / (1 + hollow[near] / np.maximum(rim, 1e-9)), 1.0)
+        return share
+
+    def hollow(self, points: np.ndarray) -> np.ndarray:
+        """(v,) bool, so close to a concave crease, and no nearer to a convex one, that they are eased."""
+        return self.share(points) >= 1
+
+
+def _creases(shape: TrueShape) -> _Creases:
+    middles, _, turn = shape.creases_cut(_CREASE_SPACING_M)
+    return _Creases(cKDTree(middles[turn < 0]), cKDTree(middles[turn > 0]))
+
+
+def _line(shape: TrueShape, creases: _Creases, rims: np.ndarray, base: np.ndarray) -> cKDTree:
+    """Points along those sharp creases that are nearer to vertices `rims` (r, 3) than to the base's."""
     points = shape.crease_points(_CREASE_SPACING_M)
+    points = points[~creases.hollow(points)]
     if len(base):
         points = points[cKDTree(rims).query(points)[0] < cKDTree(base).query(points)[0]]
     return cKDTree(points)
-
-
-def _hollows(shape: TrueShape) -> cKDTree:
-    """Points along the concave creases; it may hold none."""
-    middles, _, turn = shape.creases_cut(_CREASE_SPACING_M)
-    return cKDTree(middles[turn < 0])
-
-
-def _beside(hollows: cKDTree, points: np.ndarray) -> np.ndarray:
-    """(v,) bool, so close to a concave crease that it is eased."""
-    return np.isfinite(hollows.query(points, distance_upper_bound=_HOLLOW_REACH_M)[0])
 
 
 def _on_creases(
@@ -277,7 +290,7 @@ def _lifted(
 
 
 def _eased(
-    placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, own: np.ndarray, creases: cKDTree
+    placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, own: np.ndarray, creases: _Creases
 ) -> tuple[np.ndarray, np.ndarray]:
     """Vertices `own` beside concave creases moved to the mean of the surface around them, and turned with it.
 
@@ -290,7 +303,7 @@ def _eased(
     parts = np.repeat(area / 6, 3, axis=0)
     size = np.linalg.norm(parts, axis=1)
     widest = max(_HOLLOW_ROUNDING_M, NORMAL_SMOOTHING_M)
-    near = creases.query(placed[own], distance_upper_bound=3 * widest)[0]
+    near = creases.hollows.query(placed[own], distance_upper_bound=3 * widest)[0]
     own, near = own[np.isfinite(near)], near[np.isfinite(near)]
     pairs = cKDTree(placed[own]).sparse_distance_matrix(cKDTree(places), 3 * widest, output_type="ndarray")
     row, column, shape = pairs["i"], pairs["j"], (len(own), len(places))
@@ -306,11 +319,13 @@ def _eased(
     unit = parts / np.maximum(size, 1e-300)[:, None]
     agreement = np.linalg.norm(mean(unit, _HOLLOW_ROUNDING_M), axis=1)
     flat, crease = EASED_AGREEMENT
+    whole = _smooth_step(creases.share(placed[own]))  # a rim close by keeps its place
     # round faces agree better than that: the mean would draw them inwards
-    share = _smooth_step((flat - agreement) / (flat - crease))[:, None]
-    moved[own] += share * (mean(places, _HOLLOW_ROUNDING_M) - placed[own])
+    share = whole * _smooth_step(3 - near / _HOLLOW_ROUNDING_M)
+    share *= _smooth_step((flat - agreement) / (flat - crease))
+    moved[own] += share[:, None] * (mean(places, _HOLLOW_ROUNDING_M) - placed[own])
     facing = unit_vectors(mean(unit, NORMAL_SMOOTHING_M), normals[own])
-    turned[own] = _towards(normals[own], facing, _smooth_step(3 - near / NORMAL_SMOOTHING_M))
+    turned[own] = _towards(normals[own], facing, whole * _smooth_step(3 - near / NORMAL_SMOOTHING_M))
     return moved, turned
 
 

@@ -109,6 +109,41 @@ def test_beside_a_rim_a_small_tip_feels_the_face_and_not_the_rim():
     assert straight[0] > 0.0015 and straight[1] < 0.0005
 
 
+def terrace(cells: tuple[int, int]) -> TetMesh:
+    """A terrace of 6 mm on a disc: a rim 7 mm from the hollow at its foot."""
+    profile = np.array([[0.030, 0.0], [0.030, 0.020], [0.013, 0.020], [0.010, 0.026]])
+    mesh = shapes.cylinder(0.030, 0.026, cells, order=1)
+    points, r = mesh.points.copy(), np.hypot(*mesh.points[:, :2].T)
+    top = np.interp(r, profile[:0:-1, 0], profile[:0:-1, 1])
+    points[:, 2] *= np.where(r < 0.0295, top, 0.020) / 0.026
+    return TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable, turned_on_a_lathe(profile))
+
+
+def test_a_rim_beside_a_hollow_keeps_its_place():
+    """It was rounded as the hollow is, 0.45 mm off, and felt far too late."""
+    mesh = terrace((12, 7))
+    felt = contact_surface(mesh).arrays
+    used = np.unique(felt.triangles[felt.free > 0])
+    r, z = np.hypot(*felt.vertices[used, :2].T), felt.vertices[used, 2]
+    off = np.abs(mesh.shape.distance(felt.vertices[used]))
+    assert (z > 0.0255).sum() > 40
+    assert off[z > 0.0255].max() < 3e-5
+    assert felt.normals[used][(r < 0.0075) & (z > 0.02), 2].min() > 1 - 1e-6
+
+
+def test_a_tip_that_slides_into_a_hollow_below_a_rim_never_steps():
+    """Half a millimetre deep, down the slope, over the ground and back: the force fell to 0 or by a third."""
+    ends = np.array([[0.0149, 0.0007, 0.0263], [0.01578, 0.0007, 0.0245], [0.0200, 0.0007, 0.0245]])
+    down, along = (np.linspace(a, b, 1500) for a, b in zip(ends, ends[1:], strict=False))
+    path = np.vstack([np.linspace(ends[0] + [2e-3, 0, 1e-3], ends[0], 500), down, along])
+    path = np.vstack([path, path[:500:-1]])
+    renderer = shapes.fem(shapes.model(terrace((8, 5)).quadratic()), dent_law="linear", friction=0.0)
+    force = renderer.follow(renderer.start([TIP]), path[:, None], np.full(len(path), 1e-3))[:, 0]
+    size = np.linalg.norm(force, axis=1)
+    assert size[500:].min() > 0.005
+    assert np.linalg.norm(np.diff(force, axis=0), axis=1).max() < 0.02 * size.max()
+
+
 def test_a_crease_that_fades_leaves_no_triangle_without_area_and_no_normal_without_length():
     """A block with a roof on it: several fine vertices have the same end of its ridge as nearest crease."""
 
