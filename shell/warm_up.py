@@ -1,8 +1,8 @@
-"""Compile what a first touch and the demo need on a small block, in processes beside what else is to be done.
+"""Compile what a first touch and the demo need on a small block, in a process beside what else is to be done.
 
 A fresh installation has no compiled kernels on disk; compiling them takes some tens of seconds of a core.
-Each process compiles a part of them, so that two cores share it, and leaves a mark beside the kernels: it is
-done once. Run as `python -m palpate.warm_up STAGE...`; a failure costs only time.
+The process leaves a mark for each stage beside the kernels: it is done once. Run as `python -m
+palpate.warm_up STAGE...`; a failure costs only time.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ import numpy as np
 from palpate.child import end_with_parent, module_command
 from palpate.mechanics.kernel_cache import choose_folder
 
-BESIDE_ONE_ANOTHER = (("renderer", "replay"), ("tick", "spring-damper model"))
-"""Stages by process: about the same work for each."""
+OF_THE_DEMO = (("renderer", "replay", "tick", "spring-damper model"),)
+"""Stages by process. The demo itself has work for a core until they are needed: a second process would take
+that from it, and import and build a block of its own (7 of 39 s of the processor)."""
 OF_A_TOUCH, OF_ITS_SERVO = (("renderer",),), ("tick", "spring-damper model")
 """The same for a touch alone, whose servo process compiles its part itself before it is told what to do."""
 _SIZE_M, _TIP_RADIUS_M = 0.012, 0.005
 
 
 @contextmanager
-def warming_up(processes_of: Sequence[Sequence[str]] = BESIDE_ONE_ANOTHER) -> Iterator[Callable[[], object]]:
+def warming_up(processes_of: Sequence[Sequence[str]] = OF_THE_DEMO) -> Iterator[Callable[[], object]]:
     """What waits for the compiling processes, which are started at once and ended with the block where they
     still run then; nothing is started where these kernels are compiled. processes_of: stages by process."""
     processes = [

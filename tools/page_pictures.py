@@ -1,7 +1,8 @@
 """Make the pictures of pages and of comparisons in `docs/images`, by a browser: `page-demo`, `page-phone`,
-`press`, `compare-by-press`, `compare-left-out-foot`.
+`page-diagnosis`, `press`, `compare-by-press`, `compare-left-out-foot`.
 
-The demo and the comparison are of the embedded cylinder; the phone's is the page of a diagnosis, in the dark.
+The demo and the comparison are of the embedded cylinder. The diagnosis is of `palpate simulate block -o
+gel.csv.gz --effect viscoelasticity=1 --seed 3 --no-sizes`; the phone shows its page too, in the dark.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Write the five; nothing to tell of them."""
+    """Write the six; nothing to tell of them."""
     folder: Path = arguments.folder
     compared = pp.compare("silicone-1-cylinder", progress=False)
     _write(folder / "compare-by-press.png", drawn(draw, compared, 8, 3.2, layout=None))
@@ -47,6 +48,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         demo(window=False)
         tab.open(Path(work) / "palpate-demo" / "report.html", 900, 680)
         tab.picture(folder / "page-demo.png")
+        tab.open(diagnosis, 1280, 1000)
+        tab.picture(folder / "page-diagnosis.png")
         tab.open(diagnosis, 390, 844, dark=True)
         tab.evaluate("document.querySelector('.view3d').scrollIntoView()")
         tab.picture(folder / "page-phone.png")

@@ -18,7 +18,7 @@ from palpate.diagnosis.compare.models import RIVALS, Fem, Prepared, predicted, p
 from palpate.mechanics.compliance.smooth_field import SmoothField
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.options import option
+from palpate.mechanics.options import EXACT, option
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Progress, part, silent
 from palpate.mechanics.recording.recording import Recording
@@ -52,6 +52,7 @@ class CompareOptions:
         "model alike",
         choices=("read", "moved"),
     )
+    exact: bool = option(False, EXACT)
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,9 @@ def compare_presses(
 ) -> Comparison:
     """`compare` on a table of presses that touch the model. Raises ContactError for fewer sites than two."""
     options = options or CompareOptions()
-    prepared = prepare(table, model, options.site_m, part(progress, 0.0, 0.3), field=options.field)
+    prepared = prepare(
+        table, model, options.site_m, part(progress, 0.0, 0.3), field=options.field, exact=options.exact
+    )
     presses = prepared.presses
 
     others = {name: given.at(presses.t) for name, given in (simulated or {}).items()}

@@ -20,12 +20,13 @@ import numpy as np
 from palpate.mechanics.compliance.pressed_places import UNIFORM, Places, places_at
 from palpate.mechanics.compliance.sites import TouchSites, touch_sites, touch_solver
 from palpate.mechanics.compliance.smooth_field import SmoothField
-from palpate.mechanics.contact.touch import forces_at
+from palpate.mechanics.contact.touch import forces_at, touched
 from palpate.mechanics.law_errors import DepthLaw
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.model.one_d_laws import LAWS as ONE_D_LAWS
 from palpate.mechanics.model.one_d_laws import RIVALS as RIVALS
 from palpate.mechanics.model.one_d_laws import OneDLaws, forces_of, spread_law
+from palpate.mechanics.press_solver.solved_places import PlacesToSolve, solve_touched
 from palpate.mechanics.presses.making import of_paths
 from palpate.mechanics.presses.repeats import sites_of
 from palpate.mechanics.presses.table import MARGIN_S, Presses
@@ -41,6 +42,7 @@ from palpate.reconstruction.steps.s7_modulus.modulus_field import (
 )
 from palpate.reconstruction.steps.s7_modulus.press_fit import touched_by_law
 from palpate.render.replay import rms_n
+from palpate.render.surface.felt_surface import felt_surface
 
 HOMOGENEOUS = "fem-homogeneous"
 MODELS = ("fem", *RIVALS, HOMOGENEOUS)
@@ -56,14 +58,14 @@ class Prepared:
     """The contact samples of the presses, net of free air, and what each model needs of them.
 
     unit: dent law -> (n, 3) m^2, force for unit modulus, the object of one modulus. laws: 1D name -> Law of
-    each press's own fit. sites, places: where the presses are. own: dent law -> each press's own modulus;
-    none: fields are not asked about.
+    each press's own fit. sites: dent law -> where the presses are; places: the same. own: dent law -> each
+    press's own modulus; none: fields are not asked about.
     """
 
     presses: Presses
     unit: dict[str, np.ndarray]
     laws: dict[str, OneDLaws]
-    sites: TouchSites
+    sites: dict[str, TouchSites]
     places: Places
     own: dict[str, PressModuli]
 
@@ -80,10 +82,11 @@ def prepare(
     progress: Progress = silent,
     *,
     field: str = "auto",
+    exact: bool = False,
 ) -> Prepared:
     """Contact samples and what each model needs; the touch sites are solved here. site_m: None keeps the
-    table's sites. field: as in CompareOptions. First touches that were not recorded are found by the touch
-    law, for every model alike."""
+    table's sites. field, exact: as in CompareOptions. First touches that were not recorded are found by the
+    touch law, for every model alike."""
     model = of_one_modulus(model)
     if site_m is not None:
         table = replace(table, site=sites_of(table.point, table.normal, site_m))
@@ -94,9 +97,10 @@ def prepare(
     table = touched_by_law(table, solved, LAWS, DepthLaw.field.value, table.noise.raw_n)
     smooth = low_passed(table)
     presses = replace(smooth, force=table.net.force).window(MARGIN_S, MARGIN_S)
+    sites = _exact_sites(model, table, solved, progress) if exact else dict.fromkeys(LAWS, solved)
     unit = {
         law: forces_at(
-            solved,
+            sites[law],
             presses.displacement,
             presses.starts,
             young_modulus_pa=1.0,
@@ -109,15 +113,29 @@ def prepare(
     places, own = places_at(model, table, solved), {}
     if field != "homogeneous":
         places.stages[UNIFORM] = solver
-        own = {law: press_moduli(table, solved, places, law, table.noise.raw_n) for law in LAWS}
+        own = {law: press_moduli(table, sites[law], places, law, table.noise.raw_n) for law in LAWS}
     return Prepared(
         presses,
         unit,
         {name: ONE_D_LAWS[name](fitted) for name in RIVALS},
-        solved,
+        sites,
         places,
         own,
     )
+
+
+def _exact_sites(
+    model: Model, table: Presses, sites: TouchSites, progress: Progress
+) -> dict[str, TouchSites]:
+    """The touched places solved under each dent law."""
+    felt = felt_surface(model)
+    asked = PlacesToSolve(sites.points, table.site, table.deepest, touched(sites))
+    solved = solve_touched(
+        model.mesh, asked, LAWS, ratio=np.ones(len(model.mesh.tetrahedra)), poisson_ratio=sites.poisson_ratio,
+        young_modulus_pa=1.0, tip_radius_m=table.tip_radius_m, surface=(felt.points, felt.triangles),
+        progress=progress,
+    )  # fmt: skip
+    return {law: replace(sites, factors=solved.factors[law]) for law in LAWS}
 
 
 @dataclass(frozen=True)
@@ -148,7 +166,7 @@ def _homogeneous(prepared: Prepared, train: np.ndarray) -> Fem:
         modulus = _scale(unit[seen], measured)
         fits.append((rms_n(modulus * unit[seen] - measured), modulus, law))
     _, modulus, law = min(fits)
-    return Fem(law, modulus, with_field(prepared.sites, prepared.places, None))
+    return Fem(law, modulus, with_field(prepared.sites[law], prepared.places, None))
 
 
 def _fem(prepared: Prepared, train: np.ndarray) -> Fem:
@@ -160,7 +178,7 @@ def _fem(prepared: Prepared, train: np.ndarray) -> Fem:
     found = fit_field(prepared.own[law], train)
     if found is None or not asked_for(found):
         return plain
-    fem = Fem(law, 1.0, with_field(prepared.sites, prepared.places, found.field), found.field)
+    fem = Fem(law, 1.0, with_field(prepared.sites[law], prepared.places, found.field), found.field)
     presses = prepared.presses
     seen = presses.rows(train)
     # first touches of what is fitted are where that fit has them

@@ -112,11 +112,13 @@ def follow(start, t, depth, site, felt, numbers, reach_m, sub_places, memory, f)
                     x = before + 2.0 * share * (depth[i] - before)
                 elif share > 0.5:
                     x = depth[i] + (2.0 * share - 1.0) * (after - depth[i])
-                force[:] = f[i]
+                for c in range(3):  # a slice set to an array compiles for as long as all the rest
+                    force[c] = f[i, c]
                 sharp_laws(numbers, memory, x, deepest, dent_load(x), most, dt, normal, force)
                 for c in range(3):
                     mean[c] += force[c] / sub_places
-            f[i] = mean
+            for c in range(3):
+                f[i, c] = mean[c]
             if depth[i] <= -reach_m:
                 memory[:] = 0.0
                 deepest = 0.0

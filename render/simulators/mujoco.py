@@ -27,6 +27,7 @@ from palpate.render.simulators.tunable import EDGES, Tunable, density
 
 POISSON_LIMIT = 0.45
 """Beyond it linear tetrahedra lock, and the solver of the elastic forces does not converge at 0.49."""
+GREY = "0.5 0.5 0.5 1"
 HEAVY_KG = 1e3
 """Of the tip: what it gains of speed within a step by what pushes it is nothing."""
 
@@ -88,9 +89,11 @@ def scene_xml(
     *,
     start: np.ndarray | None = None,
     beside: str = "",
+    colours: tuple[str, str] = (GREY, GREY),
 ) -> str:
     """An object as a flex, and a sphere whose centre is the first three of qpos, away from `start` (3,) m
-    (None: the origin). given: as `Adapter.stated`. beside: more elements of the file.
+    (None: the origin). given: as `Adapter.stated`. beside: more elements of the file. colours: rgba of object
+    and sphere.
 
     All of the scene but `own.material`, which no file can say. Its cones of friction are elliptic unless the
     settings say so: pyramids push back the less the greater the friction is, from 1 on, at 10 not at all.
@@ -115,8 +118,8 @@ cone="{_CONES[round(own.cone)]}" impratio="{own.friction_ratio:g}"/>
 <worldbody>
 <body name="tip"{at}>
 {slides}
-<geom name="tip" type="sphere" size="{radius_m}" mass="{HEAVY_KG:g}" {contact}/></body>
-<flexcomp name="object" type="direct" dim="3" mass="{mass}" radius="{own.skin_m:g}"
+<geom name="tip" type="sphere" size="{radius_m}" mass="{HEAVY_KG:g}" rgba="{colours[1]}" {contact}/></body>
+<flexcomp name="object" type="direct" dim="3" mass="{mass}" radius="{own.skin_m:g}" rgba="{colours[0]}"
 point="{points}" element="{elements}">
 <contact selfcollide="none" {contact}/>
 <elasticity young="{given["young_modulus_pa"]}" poisson="{given["poisson_ratio"]}"

@@ -14,6 +14,8 @@ import numpy as np
 from palpate.exporting.subject import Subject
 from palpate.render.options import BEST
 from palpate.render.simulators.mujoco import MuJoCo, scene_xml
+from palpate.show.colours import COLOURS
+from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, view_axes
 
 FILE_SETTINGS = "material=1,skin_m=1e-4"
 """A file's flex is a Saint Venant-Kirchhoff solid, which gives way where it is crushed; its radius, by which
@@ -28,21 +30,35 @@ def _row(values: np.ndarray) -> str:
     return " ".join(f"{value:.9g}" for value in values)
 
 
+def _rgba(thing: str) -> str:
+    return _row((np.array([*bytes.fromhex(COLOURS[thing][1:]), 255]) / 255).round(3))
+
+
 def text_of(subject: Subject, numbers: str = FILE_SETTINGS, settings: str = BEST) -> str:
     """The MJCF scene; `ctrl` of its three actuators leads the tip's centre away from its start, in metres."""
     run = subject.as_run(MuJoCo, numbers, settings)
     mesh = run.mesh_under(subject.near, subject.radius_m)
-    middle, span = mesh.points.mean(axis=0), float(np.ptp(mesh.points, axis=0).max())
+    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    middle, span, across = (low + high) / 2, float((high - low).max()), float(np.linalg.norm(high - low))
     drive = f'kp="{DRIVE_N_PER_M:g}" dampratio="1" ctrlrange="-{span:.6g} {span:.6g}"'
     drives = "\n".join(f'<position name="tip_{axis}" joint="tip_{axis}" {drive}/>' for axis in "xyz")
-    beside = f"""<statistic center="{_row(middle)}" extent="{span:.6g}"/>
+    up = subject.model.support.normal
+    ahead = -view_axes(up, ELEVATION_DEG, AZIMUTH_DEG)[2]
+    azimuth, elevation = np.degrees([np.arctan2(ahead[1], ahead[0]), np.arcsin(ahead[2])])
+    # the viewer begins at 1.5 extents from the centre
+    beside = f"""<statistic center="{_row(middle)}" extent="{across:.6g}"/>
+<visual><global azimuth="{azimuth:.4g}" elevation="{elevation:.4g}" offwidth="1280" offheight="960"/>
+<headlight ambient="0.4 0.4 0.4" diffuse="0.4 0.4 0.4" specular="0 0 0"/></visual>
 <custom><text name="pressed" data="{_row(subject.pressed)}"/></custom>
-<worldbody><light pos="{_row(middle + 3 * span * subject.model.support.normal)}"/></worldbody>
+<worldbody><light pos="{_row(middle + 3 * span * up)}" diffuse="0.4 0.4 0.4"/></worldbody>
 <actuator>
 {drives}
 </actuator>
 """
-    scene = scene_xml(mesh, subject.radius_m, run.stated, run.own, start=subject.near, beside=beside)
+    scene = scene_xml(
+        mesh, subject.radius_m, run.stated, run.own, start=subject.near, beside=beside,
+        colours=(_rgba("object"), _rgba("tip")),
+    )  # fmt: skip
     return f"<!-- {subject.label} -->\n{scene}"
 
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
@@ -137,6 +138,16 @@ def diagnose(
             only="command",
         ),
     ] = None,
+    truth: Annotated[
+        str | None,
+        option(
+            "the sealed truth of `palpate simulate --seal --truth`: say whether the verdict is right",
+            metavar="TRUTH.json",
+            reads=True,
+            only="command",
+            advanced=True,
+        ),
+    ] = None,
     report: Annotated[
         str | None, report_option("write the three answers with pictures as one HTML page")
     ] = None,
@@ -159,6 +170,7 @@ def diagnose(
     from palpate.mechanics.press_solver.press import LAWS
     from palpate.mechanics.press_solver.solved_places import deepest_of_sites, said_beforehand
     from palpate.reconstruction.presses_on_model import presses_on
+    from palpate.scenes.laboratory.sealing import opened, seal_of
 
     runs = [(simulator_settings, simulator_set)]
     if renderer is not None:
@@ -170,6 +182,7 @@ def diagnose(
     best = None if baseline is None or simulated is None else _forces(baseline, of_forces.simulated_unit)
     if corrected and not str(corrected).endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{corrected}' must end in .csv or .csv.gz")
+    sealed = None if truth is None else opened(seal_of(Path(str(recording))), truth)
     source, measured = given_model(model, file), read_recording(recording)
     with call.progress("diagnose") as show_progress:
         if source is None:
@@ -229,6 +242,11 @@ def diagnose(
                     result = replace(result, mended=found)
     own: Diagnosis = getattr(result, "reality", result)
     following = []
+    if sealed is not None:
+        from palpate.show.diagnosis.truth import judged, truth_lines
+
+        call.then(partial(truth_lines, own, sealed))
+        call.figures = {"truth": {"effects": sealed["effects"], "verdict": judged(own, sealed)[0]}}
     if apply:
         call.then(partial(_applied, own, apply))
         following.append(f"next: feel it: palpate touch {typed_word(apply)}")

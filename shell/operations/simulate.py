@@ -23,6 +23,7 @@ from palpate.operations._call import Call
 from palpate.operations._declare import Given, argument, operation, option
 from palpate.operations._shared import SAMPLES, PhantomFileOptions, Seed, report_option, save_option
 from palpate.operations._to_argparse import natural
+from palpate.operations._written import typed
 from palpate.output import emit_json
 from palpate.scenes.laboratory.effects import REGISTRY
 from palpate.scenes.laboratory.hand import HandOptions
@@ -158,20 +159,14 @@ def simulate(
         call.then(f"written to {result.recording.path}")
         return result
     path = write_sealed(str(save), result.recording, result.truth, str(truth))
-    seal_file = seal_of(path)
-    opening = (
-        "from palpate.scenes.laboratory.sealing import opened; "
-        f"print(opened({str(seal_file)!r}, {truth!r})['strengths'])"
-    )
     call.then(
         f"written to {path}, without its truth",
-        f"sealed: {seal_file} holds a hash of the truth; the truth itself, and the salt of the hash: {truth}",
+        f"sealed: {seal_of(path)} holds a hash of the truth; truth and salt: {truth}",
     )
     unlabelled = dataclasses.replace(result, recording=read_recording(path))
     call.following = [
         partial(next_lines, unlabelled),
-        "      with a verdict, see what was sealed, and that nobody changed it (no command compares them):",
-        f'      python -c "{opening}"',
+        "      judge a verdict by what was sealed: " + typed("diagnose", {"recording": path, "truth": truth}),
     ]
     sealed: Any = _Sealed(result, path)
     return sealed

@@ -118,6 +118,7 @@ GAP = {
     "effects": many(_EFFECT),
     "young_modulus_pa": NUMBER,
     "next_touch": or_null(_NEXT),
+    "truth": Sometimes(table(effects=TEXTS, verdict=one_of(("right", "partly right", "wrong")))),
 }
 DIAGNOSE = table(
     **GAP,

@@ -20,10 +20,10 @@ from scipy.spatial.distance import cdist
 
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.render.base import Renderer
 from palpate.render.surface.felt_surface import felt_surface
 from palpate.show.colours import COLOURS
+from palpate.show.light import LitSurface, lit
 from palpate.show.quantities import ShownQuantity
 
 if TYPE_CHECKING:
@@ -196,47 +196,42 @@ def add_object(
     colour_map: str = "viridis",
 ) -> None:
     """The touchable surface on its support plane. values (n,): one a point of `surface_of`, named `label`."""
-    _add_surface(plotter, model, *surface_of(model), felt_surface(model).normals, values, label, colour_map)
+    points, triangles = surface_of(model)
+    _add_surface(plotter, model, points, lit(points, triangles), values, label, colour_map)
 
 
 def add_deformed(plotter: pyvista.Plotter, renderer: Renderer, displacement: np.ndarray) -> None:
     """The renderer's surface, displaced by (n, 3) m and coloured by how far, on its support plane."""
-    rest, triangles = renderer.surface
-    turned = vertex_normals(rest + displacement, triangles) - vertex_normals(rest, triangles)
-    normals = renderer.contact.arrays.normals + turned
-    moved = 1e3 * np.linalg.norm(displacement, axis=1)
-    _add_surface(
-        plotter, renderer.model, rest + displacement, triangles, normals, moved, "displacement [mm]", "YlOrRd"
-    )
+    (rest, triangles), moved = renderer.surface, 1e3 * np.linalg.norm(displacement, axis=1)
+    seen = lit(rest, triangles, renderer.contact.arrays.free > 0)
+    _add_surface(plotter, renderer.model, rest + displacement, seen, moved, "displacement [mm]", "YlOrRd")
 
 
 def _add_surface(
     plotter: pyvista.Plotter,
     model: Model,
     points: np.ndarray,
-    triangles: np.ndarray,
-    normals: np.ndarray,
+    seen: LitSurface,
     values: np.ndarray | None,
     label: str,
     colour_map: str,
 ) -> None:
     import pyvista
 
-    surface = pyvista.PolyData.from_regular_faces(np.array(points), triangles)
-    # shaded as a tip feels it, not by its triangles
-    surface.point_data["normals"] = normals
+    drawn = points[seen.at]
+    surface = pyvista.PolyData.from_regular_faces(drawn, seen.triangles)
+    surface.point_data["normals"] = seen.turned(points)
     surface.point_data.active_normals_name = "normals"
     look: dict[str, Any] = {"color": COLOURS["object"]}
-    used = np.unique(triangles)
     if values is not None:
-        surface[label] = np.asarray(values, dtype=float)
-        limits = float(np.nanmin(surface[label][used])), float(np.nanmax(surface[label][used]))
+        surface[label] = np.asarray(values, dtype=float)[seen.at]
+        limits = float(np.nanmin(surface[label])), float(np.nanmax(surface[label]))
         look = {"scalars": label, "cmap": colour_map, "clim": limits}
         look["scalar_bar_args"] = {"title": label, **_BAR}
     actor = plotter.add_mesh(surface, ambient=0.3, diffuse=0.75, **look)
     actor.prop.interpolation = "Gouraud"
-    size = 1.5 * float(np.linalg.norm(np.ptp(points[used], axis=0)))
-    middle, up = points[used].mean(axis=0), model.support.normal
+    size = 1.5 * float(np.linalg.norm(np.ptp(drawn, axis=0)))
+    middle, up = drawn.mean(axis=0), model.support.normal
     foot = middle - model.support.height(middle) * up
     plane = pyvista.Plane(center=foot, direction=up, i_size=size, j_size=size)
     plotter.add_mesh(plane, color=COLOURS["support"], lighting=False)

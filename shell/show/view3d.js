@@ -10,6 +10,7 @@ const NAMES = {into: "force into the surface [N]", sideways: "force sideways [N]
 
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
 const floats = text => new Float32Array(bytes(text));
+const shares = text => Float32Array.from(new Int16Array(bytes(text)), whole => whole / 32767);
 const whole = text => new Uint32Array(bytes(text));
 const said = (value, digits = 3) => !Number.isFinite(value) ? "–" : Number(value.toPrecision(digits)).toString();
 const el = (tag, attributes = {}, text = "") => {
@@ -33,7 +34,7 @@ function start(root) {
   const data = JSON.parse(root.querySelector("script.data").textContent);
   const part = name => root.querySelector("." + name);
   const stage = part("stage"), tip = part("tip"), by = part("by"), axis = part("axis");
-  const points = floats(data.points);
+  const points = shares(data.points).map(share => share * data.reach);
   const triangles = data.wide ? whole(data.triangles) : new Uint16Array(bytes(data.triangles));
   const up = new THREE.Vector3(...data.up), aside = new THREE.Vector3(...data.aside);
   const across = new THREE.Vector3().crossVectors(up, aside);
@@ -57,10 +58,10 @@ function start(root) {
   geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
   const shade = new Float32Array(points.length);
   geometry.setAttribute("color", new THREE.BufferAttribute(shade, 3));
+  geometry.setAttribute("normal", new THREE.BufferAttribute(shares(data.normals), 3));
   geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
   geometry.computeBoundingSphere();
   const middle = geometry.boundingSphere.center.clone(), size = geometry.boundingSphere.radius;
-  smooth();
   const body = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({vertexColors: true, shininess: 18, specular: 0x151515}));
   scene.add(body);
   floor();
@@ -72,18 +73,6 @@ function start(root) {
   const halo = new THREE.Mesh(new THREE.SphereGeometry(1.75 * dot, 24, 16), new THREE.MeshBasicMaterial({side: THREE.BackSide}));
   halo.visible = false;
   scene.add(halo);
-
-  function smooth() {  // the rim of the foot is lit as the side is: what lies on the floor does not round it off
-    const low = k => points[3 * k] * up.x + points[3 * k + 1] * up.y + points[3 * k + 2] * up.z < data.floor + 1e-3 * size;
-    const side = [];
-    for (let k = 0; k < triangles.length; k += 3) {
-      const corners = triangles.subarray(k, k + 3);
-      if (!corners.every(low)) side.push(...corners);
-    }
-    geometry.setIndex(side.length ? side : Array.from(triangles));
-    geometry.computeVertexNormals();
-    geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
-  }
 
   function floor() {  // seen from above alone, with the shade of what stands on it
     const turn = new THREE.Quaternion().setFromRotationMatrix(new THREE.Matrix4().makeBasis(aside, across, up));

@@ -20,12 +20,15 @@ from typing import Any
 
 import numpy as np
 
+from palpate.show.light import lit
 from palpate.show.quantities import ORDER, ShownQuantity
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, level_axes, spread_over
 
 _SHOWN_SHARE = (2.0, 98.0)
 _STOPS = 24
-_SHORT = 65_535
+_SHORT, _ONE = 65_535, 32_767
+_STANDING = 1e-3
+"""Of the object's size: what is no higher above the support belongs to the foot."""
 _THREE = re.compile(r'.*?Object\.defineProperty\(\w+,"__esModule",\{value:!0\}\)\}\)\);?', re.DOTALL)
 
 
@@ -69,11 +72,18 @@ def _data(view: View) -> dict[str, Any]:
     thing = view.thing
     middle = 0.5 * (thing.points.min(axis=0) + thing.points.max(axis=0))
     up = thing.up / np.linalg.norm(thing.up)
+    height = (thing.points - thing.support_point) @ up
+    standing = height < _STANDING * np.linalg.norm(np.ptp(thing.points, axis=0))
+    seen = lit(thing.points, thing.triangles, ~standing[thing.triangles].all(axis=1))
+    wide = len(seen.at) > _SHORT
+    reach = float(np.abs(thing.points - middle).max())
     head, rows = _rows(view)
     data = {
-        "points": floats(1e3 * (thing.points - middle)),
-        "wide": len(thing.points) > _SHORT,
-        "triangles": whole(thing.triangles, "<u4" if len(thing.points) > _SHORT else "<u2"),
+        "points": _shares((thing.points[seen.at] - middle) / reach),
+        "reach": 1e3 * reach,
+        "normals": _shares(seen.normals),
+        "wide": wide,
+        "triangles": whole(seen.triangles, "<u4" if wide else "<u2"),
         "places": floats(1e3 * (view.places - middle)),
         "middle": rounded(1e3 * middle),
         "up": rounded(up, 9),
@@ -84,13 +94,13 @@ def _data(view: View) -> dict[str, Any]:
         "elevation": view.elevation_deg,
         "selected": int(view.selected),
         "force": view.force,
-        "colourings": _scaled([_colouring(c, view) for c in view.known]),
+        "colourings": _scaled([_colouring(c, view, seen.at) for c in view.known]),
         "table": {"head": head, "rows": rows},
     }
     return data | ({"curves": packed_curves(view.traces)} if view.traces else {})
 
 
-def _colouring(colouring: Colouring, view: View) -> dict[str, Any]:
+def _colouring(colouring: Colouring, view: View, at: np.ndarray) -> dict[str, Any]:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -109,8 +119,8 @@ def _colouring(colouring: Colouring, view: View) -> dict[str, Any]:
         "words": colouring.words,
         "stops": [to_hex(s) for s in stops],
         "limits": (quantity, low, high, every.min(), every.max()),
-        "surface": None if values is None else floats(values * quantity.scale),
-        "known": None if known is None else whole((255 * known).round(), "u1"),
+        "surface": None if values is None else floats(values[at] * quantity.scale),
+        "known": None if known is None else whole((255 * known[at]).round(), "u1"),
         "presses": None if own is None else floats(own * quantity.scale),
     }
 
@@ -299,6 +309,11 @@ def floats(values: np.ndarray) -> str:
 
 def whole(values: np.ndarray, kind: str = "<u4") -> str:
     return base64.b64encode(np.ascontiguousarray(values).astype(kind).tobytes()).decode()
+
+
+def _shares(values: np.ndarray) -> str:
+    """Of 1, either way, to 0.003 %: half as long as `floats`."""
+    return whole((_ONE * values).round(), "<i2")
 
 
 def rounded(values: np.ndarray, digits: int = 4) -> list[float]:

@@ -6,16 +6,15 @@ from typing import Any
 
 import numpy as np
 import pyvista
-import scipy.sparse as sp
 
 from palpate.mechanics.frames import tangents
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.render.base import Renderer
 from palpate.render.press import BESIDE
 from palpate.render.support import support_plane
 from palpate.scenes.phantoms import Region
 from palpate.show.colours import COLOURS, INK, colour_of
+from palpate.show.light import lit
 from palpate.window import shadow
 from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
@@ -26,7 +25,6 @@ ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
-SPREAD = 2
 BAR = 11
 """Size of the colour bar's type, in a window of full size."""
 
@@ -63,15 +61,12 @@ class ObjectPicture:
         self._radius = tip_radius_m
         self._place = place
         plotter.subplot(*place)
-        points, triangles = renderer.surface
-        self._rest = np.array(points, dtype=float)
-        self._surface = pyvista.PolyData.from_regular_faces(self._rest.copy(), np.asarray(triangles))
-        self._surface["displacement (mm)"] = np.zeros(len(points))
-        self._moved = np.zeros_like(self._rest)
-        self._flat = vertex_normals(self._rest, np.asarray(triangles))
         felt = renderer.contact.arrays
-        self._smooth = _spread(felt.normals, felt.triangles[felt.free > 0])
-        self._shade()
+        self._lit = lit(felt.vertices, felt.triangles, felt.free > 0)
+        self._surface = pyvista.PolyData.from_regular_faces(felt.vertices[self._lit.at], self._lit.triangles)
+        self._surface["displacement (mm)"] = np.zeros(len(self._lit.at))
+        self._rest, self._moved = felt.vertices, np.zeros_like(felt.vertices)
+        self._place_surface()
         self._actor: pyvista.Actor | None = None
         self._bar, self._scale = "", 1.0
         self._title = label
@@ -106,11 +101,6 @@ class ObjectPicture:
         """Whose force the arrow is: it has that renderer's colour."""
         self._arrow.prop.color = colour_of(name)
 
-    @property
-    def rest_surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, 3) m and triangles (k, 3) of the undeformed surface."""
-        return self._rest, self._surface.regular_faces
-
     def colour_by_displacement(self) -> None:
         """As far as each point has moved, mm."""
         self.by_stiffness = False
@@ -123,7 +113,7 @@ class ObjectPicture:
         colours."""
         self.by_stiffness = True
         name = f"force over depth at {mm(depth_m, 'g')} (N/m)"
-        self._surface[name] = stiffness_n_per_m
+        self._surface[name] = stiffness_n_per_m[self._lit.at]
         self._colour_by(name, "viridis", limits)
 
     def _colour_by(self, name: str, colours: Any, limits: tuple[float, float]) -> None:
@@ -165,10 +155,11 @@ class ObjectPicture:
         for words in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
             words.SetFontSize(round(BAR * scale))
 
-    def _shade(self) -> None:
-        """As the tip feels it: by the contact normals, turned as the surface has turned since."""
-        now = vertex_normals(np.asarray(self._surface.points), self._surface.regular_faces)
-        self._surface.point_data["normals"] = self._smooth + now - self._flat
+    def _place_surface(self) -> None:
+        """Where it has moved to, and lit as it has turned."""
+        points = self._rest + self._moved
+        self._surface.points = points[self._lit.at]
+        self._surface.point_data["normals"] = self._lit.turned(points)
         self._surface.point_data.active_normals_name = "normals"
 
     def _see_through(self, on: bool) -> None:
@@ -191,11 +182,10 @@ class ObjectPicture:
     def update(self, frame: Frame, view: RendererView, below: Target | None = None) -> None:
         """Move surface, tip and arrow to a frame; below: what the tip's shadow falls on."""
         moved = view.displacement_m
-        if len(moved) == len(self._rest) and not np.array_equal(moved, self._moved):
+        if len(moved) == len(self._moved) and not np.array_equal(moved, self._moved):
             self._moved = moved
-            self._surface.points = self._rest + moved
-            self._shade()
-            self._surface["displacement (mm)"] = 1000.0 * np.linalg.norm(moved, axis=1)
+            self._place_surface()
+            self._surface["displacement (mm)"] = 1000.0 * np.linalg.norm(moved, axis=1)[self._lit.at]
         self._tip.SetPosition(*frame.tip_m)
         self._shadow.SetVisibility(below is not None)
         if below is not None:
@@ -215,18 +205,6 @@ def _ramp(stops: list[str]) -> Any:
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("displacement", stops)
-
-
-def _spread(normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(v, 3) normals, each twice over the mean of its own and its neighbours' by these triangles: a narrow
-    rim turns over several of them, not in one, and shows none."""
-    v = len(normals)
-    i, j = triangles[:, [0, 1, 2, 1, 2, 0]].ravel(), triangles[:, [1, 2, 0, 0, 1, 2]].ravel()
-    near = sp.csr_matrix((np.ones(len(i)), (i, j)), shape=(v, v)) + sp.eye(v)
-    for _ in range(SPREAD):
-        normals = near @ normals
-        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals
 
 
 def _placed(point: np.ndarray, normal: np.ndarray) -> object:

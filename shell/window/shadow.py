@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pyvista
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from palpate.mechanics.frames import tangents
 from palpate.show.colours import COLOURS
 
 FLOOR_COLOUR = np.array(pyvista.Color(COLOURS["support"]).int_rgb, dtype=float)
-DARKEST = 0.5
+DARKEST, UNDER = 0.5, 0.97
 _DIRECTIONS, _ANGLES, _NEAR_RINGS, _FAR_RINGS = 96, 72, 28, 12
 
 
@@ -27,7 +27,11 @@ def floor(middle: np.ndarray, up: np.ndarray, radius_m: float, points: np.ndarra
     far = np.geomspace(near, max(radius_m, 1.1 * near), _FAR_RINGS)[1:]
     rings = np.concatenate([np.linspace(0.0, near, _NEAR_RINGS), far])
     disc = _disc(middle, across, along, rings)
-    shade = 1.0 - DARKEST * occlusion(disc.points, points, up)
+    taken = occlusion(disc.points, points, up)
+    open_ = np.flatnonzero(taken < UNDER)
+    # as dark under the object as beside it: a triangle that lies half under it would show as a tooth
+    taken = taken[open_[cKDTree(disc.points[open_]).query(disc.points)[1]]]
+    shade = 1.0 - DARKEST * taken
     disc.point_data["shade"] = (shade[:, None] * FLOOR_COLOUR).astype(np.uint8)
     return disc
 

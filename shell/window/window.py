@@ -91,7 +91,7 @@ class TouchWindow:
         self._axes = AxesGizmo(self._first)
         self.plotter.subplot(0, 2)
         self._charts = LiveCharts(self.plotter, session.trace.SECONDS)
-        points, triangles = self.pictures[0].rest_surface
+        points, triangles = session.drawing(session.renderer_name).surface
         support, radius = session.model.support, session.servo.tip_radius_m
         self.pointer = Pointer(points, triangles, radius, support.point, support.normal)
         self.orbit = self._look()

@@ -27,6 +27,7 @@ from palpate.show.diagnosis.figures import press_pictures
 from palpate.show.diagnosis.gaps import press_gaps
 from palpate.show.diagnosis.parameters import parameter_rows, short
 from palpate.show.diagnosis.story import next_steps
+from palpate.show.diagnosis.truth import truth_lines
 from palpate.show.diagnosis.words import how_sure, short_verdict, verdict, where
 from palpate.show.page import file_text
 from palpate.words import force_words, spoken
@@ -305,6 +306,23 @@ def test_the_page_says_what_to_do_and_its_view_switches_effects_on(
         off, before = (np.abs(x.force_n - measured.force_n)[counted].mean() for x in (better, simulated))
         assert off < 0.7 * before
     assert not any(line.shown for line in effects)
+
+
+def test_a_verdict_is_judged_by_the_truth(delayed, nameless):
+    """Of a sealed recording a person had to compare the two by hand."""
+    truth = {"effects": ["time_delay"], "parameters": {"time_delay": {"delay_s": 0.020}}}
+    first, cause = truth_lines(delayed[2], truth)
+    assert first == "truth: time delay, as sealed; the verdict is right"
+    assert "time delay is number 1 of " in cause and cause.endswith("ms; true force reads late by 20 ms")
+    stated = float(re.search(r"late by ([\d.]+) ms; true", cause)[1])
+    assert stated == pytest.approx(20.0, abs=1.0)
+    assert "the verdict is wrong" in truth_lines(nameless, truth)[0]
+    assert truth_lines(nameless, truth)[1] == "  time delay was not tried"
+    none, made_up = truth_lines(delayed[2], {"effects": [], "parameters": {}})
+    assert none == "truth: nothing was left out, as sealed; the verdict is wrong"
+    assert made_up == "  not true: time delay"
+    both = {**truth, "effects": ["time_delay", "backlash"]}
+    assert "the verdict is partly right" in truth_lines(delayed[2], both)[0]
 
 
 def test_the_press_that_is_shown_has_one_number(delayed):

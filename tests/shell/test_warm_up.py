@@ -1,4 +1,4 @@
-"""Kernels are compiled once, in two processes at once, and the demo says what can be done meanwhile."""
+"""Kernels are compiled once, beside what else is to be done, and the demo says what can be done meanwhile."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
+import numba
 import numpy as np
 import pytest
+from numba.core import event
 
 from palpate import cli, demo, warm_up
+from palpate.diagnosis.forward import kernel
 from palpate.mechanics.compliance.sites import touch_solver
+from palpate.mechanics.effects.laws_along_path import LAWS
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.operations.demo import MEANWHILE
@@ -38,15 +43,26 @@ def test_stages_that_are_compiled_are_left_alone(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(warm_up, "choose_folder", lambda: tmp_path)
     monkeypatch.setattr(warm_up.subprocess, "Popen", Started)
     monkeypatch.setattr(Started, "all", [])
-    for left in ((), *[tuple(stages) for stages in warm_up.BESIDE_ONE_ANOTHER]):
+    first, second = ("renderer", "replay"), ("tick", "spring-damper model")
+    for left in ((), first, second):
         for name in left:
             mark = warm_up.mark_of(name)
             assert mark is not None
             mark.touch()
-        with warm_up.warming_up() as compiling:
+        with warm_up.warming_up((first, second)) as compiling:
             compiling()
-    first, second = warm_up.BESIDE_ONE_ANOTHER
     assert Started.all == [first, second, second]
+
+
+def test_the_demo_leaves_a_core_to_its_own_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two processes compiled beside it on two cores, each with an import and a block of its own."""
+    monkeypatch.setattr(warm_up, "choose_folder", lambda: tmp_path)
+    monkeypatch.setattr(warm_up.subprocess, "Popen", Started)
+    monkeypatch.setattr(Started, "all", [])
+    with warm_up.warming_up() as compiling:
+        compiling()
+    (stages,) = Started.all
+    assert set(stages) == set(warm_up.stages(None))
 
 
 def test_what_is_compiled_on_is_pressed_and_has_few_places() -> None:
@@ -58,6 +74,26 @@ def test_what_is_compiled_on_is_pressed_and_has_few_places() -> None:
         force = block.step(state, tip)[1]
     assert force[0, 2] > 0.01
     assert len(block.compliance.own) < 300
+
+
+def test_the_laws_along_a_path_compile_no_words() -> None:
+    """An array that is set to another can be of the wrong shape, which numba would say: half of its work."""
+    compiled: list[str] = []
+
+    class Listener(event.Listener):
+        def on_start(self, event: Any) -> None:
+            compiled.append(event.data["dispatcher"].py_func.__module__)
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    n, f = 4, np.zeros((4, 3))
+    start, site, felt = np.array([0, n]), np.zeros(1, dtype=np.int64), np.zeros(1)
+    laws = np.zeros((len(LAWS), 4)), 0.0, 1, np.zeros((len(LAWS), 8))
+    with event.install_listener("numba:compile", Listener()):
+        fresh = numba.njit(error_model="numpy")(kernel.follow.py_func)
+        fresh(start, np.arange(4.0), np.linspace(0, 1e-3, n), site, felt, *laws, f)
+    assert compiled and "numba.cpython.unicode" not in compiled
 
 
 def test_the_demo_says_that_its_object_can_be_touched_meanwhile(

@@ -50,6 +50,9 @@ def story(result: Comparison) -> say.Story:
         f"for comparison: the sensor's noise {mn(result.noise_n)}, a constant force instead of a model "
         f"{mn(result.constant_n)}"
     )
+    factors = next(iter(result.prepared.sites.values())).factors
+    if factors is not None:
+        yield say.TextLine(f"FEM: presses solved at {factors.solved.sum()} of {len(factors.solved)} places")
     yield say.TextLine(verdict(result))
     yield say.Turned(
         lambda: view(result),

@@ -12,6 +12,7 @@ from benchmarks._tissue import tissue
 from palpate.diagnosis.compare.comparison import Along, CompareOptions, compare_presses
 from palpate.diagnosis.compare.models import HOMOGENEOUS, RIVALS, as_touched
 from palpate.mechanics.compliance import field_response as solved_fields
+from palpate.mechanics.press_solver import solved_places
 from palpate.mechanics.presses.making import PathErrors, of_paths
 from palpate.reconstruction.steps.s7_modulus.modulus_field import asked_for, fit_field
 
@@ -71,6 +72,28 @@ def test_a_simulator_beside_the_models_has_its_modulus_fitted_to_the_others_fold
     result = compare_presses(presses, slab.model, options, simulated={"mujoco": halved, "constant": constant})
     assert result.rmse_n["mujoco"] < 0.2 * result.rmse_n["fem"] < result.rmse_n["constant"]
     assert all("mujoco" in region.bias for region in result.regions)
+
+
+def test_solved_places_predict_what_no_law_has(monkeypatch):
+    """Every place answers more stiffly the deeper it is pressed: so does the solver, and no table."""
+    stiffer = 50.0
+    slab = tissue(1, log_sd=0.0, raster=3)
+    deep = np.maximum(slab.presses.depth, 0.0)
+    presses = dataclasses.replace(slab.presses, force=slab.presses.force * (1 + stiffer * deep)[:, None])
+    really = solved_places._solved
+
+    def made(held, touched, press, deepest_m, law):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(type(held), "normal_force", lambda self, p, n, d: np.ones(len(d)))
+            one = really(held, touched, press, deepest_m, law)
+        return dataclasses.replace(one, solved_n=one.law_n * (1 + stiffer * one.depth_m))
+
+    monkeypatch.setattr(solved_places, "_solved", made)
+    options = CompareOptions(folds=3, field="homogeneous")
+    plain = compare_presses(presses, slab.model, options)
+    exact = compare_presses(presses, slab.model, dataclasses.replace(options, exact=True))
+    assert exact.rmse_n["fem"] < 0.5 * plain.rmse_n["fem"]
+    assert all(exact.rmse_n[name] == pytest.approx(plain.rmse_n[name], rel=0.05) for name in RIVALS)
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
-import shlex
-import subprocess
-import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -173,17 +169,16 @@ def test_sealed_recording_withholds_the_truth_and_the_seal_finds_changes(
     seal = tmp_path / "case.sealed"
     # 'written to case.csv.gz' was all that was said of a seal
     assert str(seal) in said and str(truth) in said
-    (command,) = re.findall(r"^ *python (-c .*)$", said, re.MULTILINE)
-    shown = subprocess.run(
-        [sys.executable, *shlex.split(command)], capture_output=True, text=True, check=True
-    )
-    assert "time_delay" in shown.stdout
+    judge = f"diagnose {record} --truth {truth}"
+    assert f"palpate {judge}" in said
     assert opened(seal, truth)["effects"] == ["time_delay"]
     kept = json.loads(truth.read_text())
     kept["truth"]["effects"] = ["backlash"]
     truth.write_text(json.dumps(kept))
     with pytest.raises(RecordingError, match="not what"):
         opened(seal, truth)
+    assert main(judge.split()) == 2, "before any work"
+    assert "the truth or the salt was changed" in capsys.readouterr().err
 
 
 def test_bad_requests_say_what_is_allowed(springs, tmp_path: Path, capsys) -> None:

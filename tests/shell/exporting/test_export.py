@@ -238,6 +238,23 @@ def flex_forces(path, aside_m: float = 0.0) -> np.ndarray:
     return np.array(found)
 
 
+def test_mujocos_viewer_begins_with_the_whole_object_in_sight_and_in_its_colour(tmp_path):
+    """It began so near that half of the object lay outside the picture, grey on black."""
+    mujoco = pytest.importorskip("mujoco")
+    pp.export(block(), "mujoco", tmp_path / "m.xml", at=(0, 0, 0.03), progress=False)
+    scene = mujoco.MjModel.from_xml_path(str(tmp_path / "m.xml"))
+    data, camera = mujoco.MjData(scene), mujoco.MjvCamera()
+    mujoco.mj_forward(scene, data)
+    mujoco.mjv_defaultFreeCamera(scene, camera)
+    turn, tilt = np.radians([camera.azimuth, camera.elevation])
+    ahead = np.array([np.cos(tilt) * np.cos(turn), np.cos(tilt) * np.sin(turn), np.sin(tilt)])
+    seen = data.flexvert_xpos - (camera.lookat - camera.distance * ahead)
+    far = np.linalg.norm(seen, axis=1)
+    assert np.degrees(np.arccos(seen @ ahead / far)).max() < scene.vis.global_.fovy / 2
+    assert ahead[2] < 0 and far.min() > scene.vis.map.znear * scene.stat.extent
+    assert scene.flex_rgba[0] == pytest.approx(np.array([0xEA, 0xD7, 0xBF, 255]) / 255, abs=2e-3)
+
+
 def test_mujocos_file_gives_the_force_that_is_replayed(tmp_path):
     """The file, loaded and stepped by MuJoCo alone with its tip led by hand, against the renderer on the same
     path: down and aside, with a Poisson's ratio that a flex does not bear, a friction that never slips and a

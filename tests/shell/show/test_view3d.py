@@ -263,6 +263,30 @@ def test_the_rim_of_a_foot_is_lit_as_the_side_is(shown, tmp_path):
 
 
 @needs_browser
+def test_the_edges_of_a_block_are_sharp(shown, tmp_path):
+    """A pale band ran along them, as wide as the triangles beside them."""
+    block = trimesh.creation.box((0.06, 0.06, 0.03)).subdivide().subdivide()
+    block.apply_translation([0, 0, 0.015])
+    seen = View(
+        Thing(block.vertices, block.faces, block.vertices[:, 2] > 1e-6, np.zeros(3), np.array([0, 0, 1.0])),
+        np.array([[0, 0, 0.03]]),
+        [Colouring(ORDER, None, np.array([1.0]), "in order")],
+        azimuth_deg=0.0,
+    )
+    page = Page("A block")
+    page.view(seen, Figure(figsize=(3, 2)), "The picture.")
+    shown.open(page.write(tmp_path / "block.html"))
+    shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
+    shown.wait("document.querySelector('.stage').dataset.azimuth")
+    left, top, width, height = stage(shown)
+    column = pixels(shown, left + 0.45 * width, top, 1, height)[:, 0]
+    light = column[column[:, 0] - column[:, 2] > 15].mean(axis=1)  # the floor is grey
+    of_faces = np.abs(light[:, None] - [light[10], light[-10]]).min(axis=1)
+    assert abs(light[10] - light[-10]) > 10, "the top and a side are seen"
+    assert (of_faces > 6).sum() < 6
+
+
+@needs_browser
 def test_without_scripts_the_picture_stays(shown, written):
     shown.call("Emulation.setScriptExecutionDisabled", value=True)
     try:
