@@ -42,11 +42,15 @@ def simulator_names() -> tuple[str, ...]:
 
 
 def check_settings(name: str, settings: str, numbers: str) -> None:
-    """Raise OptionError for numbers (KEY=VALUE, comma separated) that a simulator's settings do not have,
-    before any work."""
-    from palpate.render.simulators.base import changed
+    """Raise OptionError for a simulator that is not installed, or for numbers (KEY=VALUE, comma separated)
+    that its settings do not have, before any work."""
+    from palpate.render.simulators.base import Adapter, changed, installed
 
-    changed(importlib.import_module(_SIMULATORS[name]).SETTINGS[settings], numbers)
+    module = importlib.import_module(_SIMULATORS[name])
+    for each in vars(module).values():
+        if isinstance(each, type) and issubclass(each, Adapter) and each.__module__ == module.__name__:
+            installed(each)
+    changed(module.SETTINGS[settings], numbers)
 
 
 def create(

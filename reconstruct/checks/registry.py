@@ -129,6 +129,12 @@ def no_base(recording: Recording) -> bool:
     return False
 
 
+def force_unit_doubt(recording: Recording) -> Finding | None:
+    """The question about its force's unit, whatever geometry is stated; None where there is none."""
+    found = checked_samples(recording, by_hand=False).found
+    return next((f for f in found if f.name == "force unit"), None)
+
+
 def _on_known(
     recording: Recording, samples: CheckedSamples, geometry: GeometryOptions
 ) -> tuple[tuple[Finding, ...], int | None]:

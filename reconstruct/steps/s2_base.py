@@ -93,13 +93,13 @@ def find_boundary(
         path = path[face.away(path) < face.reach_m]
     strokes = _strokes(path, FOOT * tip_radius_m)
     if sum(map(len, strokes)) < LEAST_STEPS:
-        raise ContactError("the boundary phase is shorter than 1 cm: trace the object's whole base")
+        raise ContactError("the tracing of the base is shorter than 1 cm: trace the object's whole base")
     smoothed = [gaussian_filter1d(stroke, 3.0, axis=0, mode="nearest") for stroke in strokes]
     smooth = np.concatenate(smoothed)
     winding = _winding(smooth, normal)
     if face is None and abs(winding) < 0.8 * 2 * np.pi:
         raise ContactError(
-            f"the boundary phase goes {abs(np.degrees(winding)):.0f} degrees round the object; at least "
+            f"the tracing of the base goes {abs(np.degrees(winding)):.0f} degrees round the object; at least "
             "288 are needed: trace the whole base, or say when it was ([recording] boundary_phase)"
         )
     sideways = []

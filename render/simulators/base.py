@@ -328,11 +328,16 @@ def missing(adapter: type[Adapter], error: ImportError) -> OptionError:
     )
 
 
-def made(adapter: type[Adapter], model: Model, options: RenderOptions) -> Any:
-    """The renderer of an adapter; raises OptionError where the simulator is not installed."""
+def installed(adapter: type[Adapter]) -> None:
+    """Raises OptionError where the simulator is not installed."""
     try:
         for name in adapter.needs:
             importlib.import_module(name)
     except ImportError as error:
         raise missing(adapter, error) from error
+
+
+def made(adapter: type[Adapter], model: Model, options: RenderOptions) -> Any:
+    """The renderer of an adapter; raises OptionError where the simulator is not installed."""
+    installed(adapter)
     return SimulatorRenderer(adapter.name, model, adapter, options)

@@ -108,7 +108,13 @@ class Said:
         for name, key in _NUMBERS.items():
             given = getattr(self, name)
             if given is not None and not key.takes(np.asarray(given).tolist()):
-                raise RecordingError(f"{name} is {given}; it must be {key.words}")
+                raise RecordingError(f"{name} is {given}; it must be {key.words}{_in_mm(key, given)}")
+
+
+def _in_mm(key: FileKey, given: Any) -> str:
+    """What a length would be, had it been given in mm; '' where that is not allowed either."""
+    metres = given / 1e3 if key.unit == "m" and isinstance(given, int | float) else given
+    return f": is it mm? in metres it is {metres}" if key.takes(metres) else ""
 
 
 def read_mapping(path: Path | str) -> dict[str, Any]:

@@ -144,19 +144,20 @@ def moduli(given: Any) -> Any:
         allowed = PART_MODULUS if name else YOUNG_MODULUS
         if value is not None and not allowed.takes(value):
             raise OptionError(f"--modulus{of} is {value!r}; it must be {allowed.words}")
-        if value and (words := _unlikely(float(value))):
-            warnings.warn(f"--modulus{of} is {words}", PalpateWarning, stacklevel=1)
+        if value:
+            warn_of_modulus(float(value), f"--modulus{of}", "--modulus ")
     return given
 
 
-def _unlikely(modulus_pa: float) -> str:
-    """What is odd about a modulus in Pa, with the one that may be meant; '' where a hand feels such."""
+def warn_of_modulus(modulus_pa: float, what: str, flag: str) -> None:
+    """Warn of a modulus in Pa that no hand feels, with the one that may be meant."""
     usual = EXPLORATION["modulus"]
     if usual.low <= modulus_pa <= usual.high:
-        return ""
-    words = f"{modulus_pa:g} Pa; soft objects have {usual.low:g} to {usual.high:g} Pa: "
+        return
     kilo = 1e3 * modulus_pa
-    return words + (f"in kPa? Then --modulus {kilo:g}" if usual.low <= kilo <= usual.high else "is it in Pa?")
+    meant = f"in kPa? Then {flag}{kilo:g}" if usual.low <= kilo <= usual.high else "is it in Pa?"
+    odd = f"{modulus_pa:g} Pa; soft objects have {usual.low:g} to {usual.high:g} Pa: {meant}"
+    warnings.warn(f"{what} is {odd}", PalpateWarning, stacklevel=1)
 
 
 def _plain(word: str) -> float:

@@ -30,6 +30,7 @@ from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
 from palpate.reconstruction.geometry.stated import GeometryOptions
 from palpate.render.options import DOCUMENTED
+from palpate.render.registry import check_settings
 
 if TYPE_CHECKING:
     from palpate.diagnosis.compare.before_after import Changes
@@ -87,6 +88,8 @@ def compare(
         result = changes(recording, other, diagnosed=diagnosed, seed=seed, progress=call.wanted)
         call.then_report(result, report)
         return result
+    if renderer is not None:
+        check_settings(renderer, simulator_settings, simulator_set)
     source, measured = given_model(model, file), read_recording(recording)
     with call.progress("compare") as show_progress:
         plain = None if source is None else load(source, progress=show_progress)

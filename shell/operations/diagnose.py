@@ -32,6 +32,7 @@ from palpate.operations._shared import (
     Seed,
     given_model,
     report_option,
+    warn_of_modulus,
 )
 from palpate.operations._simulators import (
     NumbersOfSimulator,
@@ -358,7 +359,9 @@ def _check(
     if stated:
         from palpate.diagnosis.other_simulator.declared_parameters import stated_values
 
-        stated_values(stated)
+        modulus_pa = stated_values(stated).get("young_modulus_pa")
+        if modulus_pa is not None:
+            warn_of_modulus(modulus_pa, "--stated young_modulus_pa", "--stated young_modulus_pa=")
 
 
 def _forces(simulated: Any, unit: str | None) -> Any:

@@ -185,14 +185,14 @@ def _next_steps(recording: Recording, output: str, look: str) -> list[str]:
     """What goes on with it: its check-up, or the geometry that no tracing tells."""
     from palpate.operations._written import open_words
     from palpate.reconstruction.checks.finding import OF_A_KNOWN_OBJECT
-    from palpate.reconstruction.checks.registry import checked_samples, no_base
+    from palpate.reconstruction.checks.registry import force_unit_doubt, no_base
 
     if not no_base(recording):
         return [f"next: {look}check it: palpate check {typed_word(output)}"]
-    units = [f for f in checked_samples(recording, by_hand=False).found if f.name == "force unit"]
+    doubt = force_unit_doubt(recording)
     ways = [f"{way.says}: {open_words({'files': (output,)}, way.options)}" for way in OF_A_KNOWN_OBJECT]
     return [
-        *(f"is the {each.name} right? {each.saw} ({each.sure})" for each in units),
+        *([f"is the {doubt.name} right? {doubt.saw} ({doubt.sure})"] if doubt else []),
         f"next: {look}say what the object is, as no foot was traced:",
         *(f"      {way}" for way in ways),
     ]

@@ -38,6 +38,7 @@ from palpate.operations._shared import (
 from palpate.reconstruction.methods import ReconstructOptions
 
 if TYPE_CHECKING:
+    from palpate.importing.imported import Imported
     from palpate.importing.kinds import Opened
     from palpate.mechanics.progress import Progress
     from palpate.mechanics.recording.recording import Recording
@@ -212,12 +213,28 @@ def _table(
     from palpate.operations.import_ import import_table
 
     brought = import_table(*files, **said)
+    _ask_of_force(brought)
     opened["names"] = {role: column.name for role, column in brought.understood.columns.items()}
     understood = {
         "took it for": "a recording in another program's table",
         **{role: str(c).partition(" = ")[2] for role, c in brought.understood.columns.items()},
     }
     return made(brought.recording, understood, brought.understood.notes, brought.understood.odds)
+
+
+def _ask_of_force(brought: Imported) -> None:
+    """Raise Unclear where nobody said the force's unit, and it looks like another than the one assumed."""
+    from palpate.importing.meaning import Unclear
+    from palpate.reconstruction.checks.registry import force_unit_doubt
+
+    columns = brought.understood.columns
+    if not any(columns[role].assumed for role in ("fx", "fy", "fz") if role in columns):
+        return
+    if (doubt := force_unit_doubt(brought.recording)) is None:
+        return
+    likely = [way.options["units"]["force"] for way in doubt.ways if "units" in way.options]
+    question = f"the force's unit is not given: {doubt.saw} ({doubt.sure})"
+    raise Unclear(question, "units", [f"force={unit}" for unit in dict.fromkeys((*likely, "mN", "N"))])
 
 
 def _reconstructed(

@@ -47,7 +47,8 @@ def _steps(result: Opened) -> list[str]:
     made = getattr(result.result, "model", result.result)
     if not isinstance(made, Model):
         return []
-    feel = feel_step(made.path, open_words(result.said, {"save": "MODEL"}))
+    making = open_words(result.said, {"save": "MODEL"})
+    feel = feel_step(made.path, making)
     if not isinstance(result.result, Reconstruction):
         return [] if made.path is not None else [feel]
     if result.result.recording.path is not None and made.path is not None:
@@ -56,8 +57,11 @@ def _steps(result: Opened) -> list[str]:
     recording = file_words(result.result.recording.path, "")
     brought = "" if recording else f"`{import_words(result.said, 'REC.csv.gz')}`, "
     model = file_words(made.path, "MODEL")
+    # what is believed was kept by the step before, to be felt
+    kept = f"`{making}`, " if made.path is None and result.result.doubt else ""
     diagnosed = f"`palpate diagnose {recording or 'REC.csv.gz'} --model {model} --report PAGE.html`"
-    return as_far_as_believed(result.result, ways, feel, f"see what it leaves out: {brought}{diagnosed}")
+    left_out = f"see what it leaves out: {kept}{brought}{diagnosed}"
+    return as_far_as_believed(result.result, ways, feel, left_out)
 
 
 KEYS: tuple[say.Key, ...] = (

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.diagnosis.numerics.registry import NAMES, numerical
 from palpate.diagnosis.other_simulator.frame import AS_RECORDED
-from palpate.diagnosis.other_simulator.result import PARTS, SimulatedGap
+from palpate.diagnosis.other_simulator.result import PARTS, Part, SimulatedGap
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.registry import effect
@@ -247,7 +247,7 @@ def _parts(result: SimulatedGap) -> say.Story:
     cards = []
     for name in PARTS:
         part = result.parts[name]
-        size = f"{force_words(part.gap_n)}, {part_share(part.share)}"
+        size = part_words(part)
         if not part.names and abs(part.share) < LEAST_SHARE:
             size = "-"
         short_names = "; ".join(_named(result, part.names, spaced))
@@ -262,13 +262,13 @@ def _parts(result: SimulatedGap) -> say.Story:
     yield say.Cards(cards)
 
 
-def part_share(share: float) -> str:
-    """A part's share of the gap's mean square; below 0 it hides another error, which is said."""
-    if share > -LEAST_SHARE:
-        return percent(share)
+def part_words(part: Part) -> str:
+    """What a part adds to the gap, and its share of the mean square; one that takes off adds nothing that has
+    a size, and hides another error."""
+    if part.share > -LEAST_SHARE:
+        return f"{force_words(part.gap_n)}, {percent(part.share)}"
     return (
-        f"{percent(share)} (once it is mended the gap's mean square is larger by {percent(-share)}: "
-        "it hides another error)"
+        f"hides another error: mended alone, it leaves the gap's mean square larger by {percent(-part.share)}"
     )
 
 

@@ -26,7 +26,7 @@ from palpate.diagnosis.other_simulator.forces import (
 )
 from palpate.diagnosis.other_simulator.gap_decomposition import PARAMETER_OF, StatedParameter
 from palpate.diagnosis.other_simulator.pipeline import Asked, _Weighed, diagnose_simulated
-from palpate.diagnosis.other_simulator.result import PARTS, Mended, parameter_words
+from palpate.diagnosis.other_simulator.result import PARTS, Mended, Part, parameter_words
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.verdict.result import EffectEntry
 from palpate.importing.simulated_forces import read_forces
@@ -42,7 +42,7 @@ from palpate.mechanics.quantities import parse_unit
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.registry import create
 from palpate.render.replay import replay
-from palpate.show.other_simulator import keys_in_words, lead, part_share, verdict
+from palpate.show.other_simulator import keys_in_words, lead, part_words, verdict
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -686,6 +686,8 @@ def test_every_effect_has_words_for_all_the_keys_that_an_answer_can_carry_of_it(
 
 
 def test_a_share_below_0_is_said_in_a_sentence():
-    plain = part_share(-0.66).replace("\N{NO-BREAK SPACE}", " ")
-    assert "larger by 66 %" in plain and "hides another error" in plain
-    assert not set("larger hides".split()) & set(part_share(0.4).split() + part_share(-0.004).split())
+    """A numerics of "0 mN, -770 %" stood beside a contact stiffness of 117 mN."""
+    plain = part_words(Part(0.0, -0.66)).replace("\N{NO-BREAK SPACE}", " ")
+    assert "larger by 66 %" in plain and "hides another error" in plain and "mN" not in plain
+    for share in (0.4, -0.004):
+        assert not set("larger hides".split()) & set(part_words(Part(0.01, share)).split())

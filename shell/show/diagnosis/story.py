@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.apply import improved
+from palpate.diagnosis.search.site_stiffness import stands_open
 from palpate.diagnosis.verdict.result import Diagnosis, parted
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.model import Model
@@ -136,6 +137,11 @@ def next_steps(result: Diagnosis) -> Iterator[str]:
     no_model_holds = [name for name in asked if name not in (*instrument, *kept)]
     if model.path is not None:
         recording += f" --model {file_words(model.path, 'MODEL')}"
+    if stands_open(model):
+        yield (
+            "first find how the shape stands: trace the table or touch its other faces; if its file is in "
+            "the device's frame already, reconstruct with `--pose given`"
+        )
     if result.next_touch is not None and result.unsettled:
         told = parted(result.next_touch.separates)
         yield f"make the next touch that is described here: it is to tell {told}"

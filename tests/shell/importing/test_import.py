@@ -312,7 +312,8 @@ def test_one_thing_said_twice_is_refused(tmp_path, capsys):
 def test_impossible_numbers_are_refused(tmp_path, capsys, words):
     (tmp_path / "log.csv").write_text("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n")
     assert cli.main(["import", str(tmp_path / "log.csv"), "--dry-run", *words]) == 2
-    assert "it must be a number from" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "it must be a number from" in said and ("it is 0.005" in said) == ("--tip-radius" in words)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a limit that only Linux has")

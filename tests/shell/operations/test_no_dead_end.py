@@ -20,6 +20,7 @@ from palpate.operations._list import OPERATIONS
 from palpate.operations._run import parser_of
 from palpate.operations._written import import_words, open_words
 from palpate.reconstruction.checks.registry import looked_at
+from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors
 from palpate.show import next_lines
 
 from ...conftest import REPOSITORY, modules_of
@@ -196,11 +197,11 @@ def test_every_way_of_every_fault_is_a_command_that_open_takes(tmp_path):
                 assert parser.parse_args(shlex.split(words)[2:]).files == ["a b.csv"]
 
 
-def robots_log(folder: Path) -> Path:
-    """Presses on flat ground, no foot traced, in mm and grams, with a driver's names."""
+def robots_log(folder: Path, of_force: str = " [gf]", unit_n: float = 9.80665e-3) -> Path:
+    """Presses on flat ground, no foot traced, in mm and a unit of force, with a driver's names."""
     recording = raster((4, 4))
-    header = "stamp,tcp_px [mm],tcp_py [mm],tcp_pz [mm],ft_x [gf],ft_y [gf],ft_z [gf]"
-    columns = [recording.t, 1e3 * recording.position, recording.force_on_tool / 9.80665e-3]
+    header = "stamp,tcp_px [mm],tcp_py [mm],tcp_pz [mm]," + ",".join(f"ft_{a}{of_force}" for a in "xyz")
+    columns = [recording.t, 1e3 * recording.position, recording.force_on_tool / unit_n]
     return write(folder / "robot.csv", columns, header)
 
 
@@ -241,6 +242,28 @@ def test_the_command_that_is_told_reaches_the_truth(tmp_path, monkeypatch, capsy
     # no folder was written, so none is named as if it were there
     assert "palpate touch MODEL" not in said or "--output MODEL" in said
     assert "palpate import robot.csv" in said, "it leaves the recording that is to be diagnosed"
+
+
+def test_a_unit_that_nobody_said_is_asked_about_before_a_modulus_is_told(tmp_path, monkeypatch, capsys):
+    """1606 kPa for 16, exit 0, and the doubt in a note below it: of a stated geometry any force may be."""
+    monkeypatch.chdir(tmp_path)
+    robots_log(tmp_path, of_force="", unit_n=1e-3)
+    words = ["open", "robot.csv", "--tip-radius", str(TIP_M), "--half-space", "--report", "none"]
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert "Young's modulus" not in said.out
+    assert "look like" in said.err and "--units force=mN or --units force=N" in said.err
+
+
+@pytest.mark.slow
+def test_what_does_not_predict_is_kept_before_it_is_looked_into(tmp_path, monkeypatch, capsys):
+    """A diagnosis by MODEL was proposed, and no MODEL was there."""
+    monkeypatch.chdir(tmp_path)
+    robots_log(tmp_path)
+    monkeypatch.setattr(HeldOutErrors, "doubt", "the model does not predict")
+    assert main([*shlex.split(f"open robot.csv --half-space --report none --tip-radius {TIP_M}")]) == 1
+    (steps,) = (s for s in capsys.readouterr().out.splitlines() if "--model MODEL" in s)
+    assert -1 < steps.find("--output MODEL") < steps.index("--model MODEL")
 
 
 def test_what_says_nothing_of_such_a_file_is_refused(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from palpate.mechanics.errors import OptionError
+from palpate.mechanics.errors import OptionError, PalpateWarning, RecordingError
 from palpate.mechanics.progress import silent
 from palpate.operations import diagnose
 from palpate.operations._simulators import Ran, mended_by, run_along, time_words
@@ -28,6 +29,28 @@ def test_what_mends_goes_on_top_of_what_was_asked():
     assert mended_by("best", "", "solref_s=0.004") == ("best", "solref_s=0.004")
     with pytest.raises(OptionError, match="--mended 'better' must be KEY=VALUE"):
         mended_by("best", "", "better")
+
+
+@pytest.mark.parametrize("name", ["tune", "diagnose", "compare"])
+def test_a_simulator_that_is_not_installed_is_said_before_a_model_is_made(monkeypatch, name):
+    """It was said after a minute of reconstruction."""
+    monkeypatch.setitem(sys.modules, "skfem", None)
+    begun: list[str] = []
+    with pytest.raises(OptionError, match="needs skfem, which is not installed: pip install"):
+        getattr(pp, name)(
+            "silicone-1-cylinder", renderer="scikit-fem", progress=lambda step, _: begun.append(step)
+        )
+    assert not begun
+
+
+def test_a_modulus_in_kpa_is_doubted_before_the_forces_are_taken_for_mn(tmp_path):
+    """--modulus 20 was warned of, --stated young_modulus_pa=20 turned a simulator's newtons into mN."""
+    given = {"simulated": tmp_path / "none.csv", "stated": {"young_modulus_pa": 20}, "progress": False}
+    with (
+        pytest.warns(PalpateWarning, match="Then --stated young_modulus_pa=20000"),
+        pytest.raises(RecordingError),
+    ):
+        pp.diagnose("silicone-1-cylinder", **given)
 
 
 def test_a_long_run_says_how_long_and_what_fewer_presses_take():
