@@ -234,7 +234,7 @@ def test_a_step_names_what_the_next_touch_separates_and_no_candidates_where_ther
         for step in next_steps(
             SimpleNamespace(
                 recording=SimpleNamespace(path=None),
-                model=SimpleNamespace(path=None),
+                model=SimpleNamespace(path=None, about={}, mesh=SimpleNamespace(points=np.eye(3))),
                 effects=(),
                 entries=(),
                 candidates=() if unknown else touch.separates,
