@@ -23,7 +23,6 @@ from palpate.mechanics.compliance.sites import (
     surface_edge,
     touch_solver,
 )
-from palpate.mechanics.contact.edges import ends_within
 from palpate.mechanics.elastic.floor import carried_by_floor
 from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.elastic.solver import Solver
@@ -35,16 +34,14 @@ from palpate.mechanics.shape.refine import typical_edge
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 
 _SAME_FACE = np.cos(np.radians(40))
-_BESIDE_RIM = np.exp(-2)  # of a straight rim at two widths
-_QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a triangle, by corners and middles
 _ENOUGH = 10  # corners for the six coefficients of a quadratic
 
 
 @dataclass(frozen=True)
 class FineCorners:
-    """v corners of the mesh that `solver` factorised, and the middles of its edges beside rims. points,
-    normals: (v, 3) m and unit. triangles: (g, 3) into them. width_m: of the load patch. balls: whether the
-    material has some; loose: whether a part of the base is (mechanics.elastic.floor)."""
+    """v corners of the mesh that `solver` factorised. points, normals: (v, 3) m and unit. triangles: (g, 3)
+    into them. width_m: of the load patch. balls: whether the material has some; loose: whether a part of the
+    base is (mechanics.elastic.floor)."""
 
     solver: Solver
     points: np.ndarray
@@ -99,26 +96,13 @@ def fine_corners(
         solver = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, hold=hold)
     elif solver is None:
         solver = touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold)
+    nodes, triangles = corners_of(solver.mesh)
     # with balls `ball_law` takes what they add under narrower loads
     width = patch_width(solver.mesh) if balls else load_width(solver)
-    nodes, triangles = _cut_beside_rims(solver.mesh, mesh, width)
     return FineCorners(
         solver, solver.mesh.points[nodes], normals_of(solver.mesh, nodes), triangles, width, bool(balls),
         is_loose(hold), tip_radius_m,
     )  # fmt: skip
-
-
-def _cut_beside_rims(fine: TetMesh, mesh: TetMesh, width_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes (v,) of the touchable surface of a quadratic mesh, and triangles (g, 3) into them: its own, but
-    for those that come within two widths of the load of a rim of `mesh`, which are cut in four.
-
-    There a place gives so unlike the next one that nothing between corners 1.75 widths apart tells it.
-    """
-    surface = fine.touchable_surface
-    near = ends_within(mesh, fine.points, width_m)[surface].max(axis=1) > _BESIDE_RIM
-    pieces = [surface[~near, :3], surface[near][:, _QUARTERS].reshape(-1, 3)]
-    nodes, local = np.unique(np.concatenate(pieces), return_inverse=True)
-    return nodes, local.reshape(-1, 3)
 
 
 def is_fine(mesh: TetMesh, balls: Sequence[Ball], hold: BaseHold | None) -> bool:
@@ -138,8 +122,8 @@ def corners_of(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def normals_of(mesh: TetMesh, nodes: np.ndarray) -> np.ndarray:
-    """(t, 3) unit outward normals at nodes (t,) of the touchable surface."""
-    return vertex_normals(mesh.points, mesh.touchable_surface)[nodes]
+    """(t, 3) unit outward normals at corner nodes (t,) of the touchable surface."""
+    return vertex_normals(mesh.points, mesh.touchable_surface[:, :3])[nodes]
 
 
 def interpolated(corners: np.ndarray, middles: np.ndarray, weights: np.ndarray) -> np.ndarray:

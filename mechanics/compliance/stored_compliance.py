@@ -16,7 +16,6 @@ from palpate.mechanics.compliance.coarse_table import CoarseCompliance, first_pl
 from palpate.mechanics.compliance.fine_corners import fine_corners, is_loose
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance, surface_compliance
-from palpate.mechanics.contact.edges import has_rims
 from palpate.mechanics.disk.store import content_key, load_or_build, read_arrays
 from palpate.mechanics.effects.hold import base_hold
 from palpate.mechanics.elastic.held_base import BaseHold
@@ -56,7 +55,6 @@ def compliance_key(model: Model, *, dense: bool = False) -> str:
         model.ratio_without_balls,
         *(() if hold is None else dataclasses.astuple(hold)),
         *(() if error is None else ("low-rank", error)),
-        *(["cut beside rims"] if has_rims(model.mesh) else []),
         *([model.tool.tip_radius_m, "felt by depth"] if balls else []),
         *(value for ball in balls for value in dataclasses.astuple(ball)),
     )

@@ -88,11 +88,6 @@ def ends_within(mesh: TetMesh, points: np.ndarray, width_m: float) -> np.ndarray
     return _summed(points, samples, length / (np.sqrt(2 * np.pi) * width_m), width_m)
 
 
-def has_rims(mesh: TetMesh) -> bool:
-    """Whether `ends_within` may be other than 0."""
-    return len(_rims(mesh, usual_width(mesh))[0]) > 0
-
-
 def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(k, g) what each comes to at places (k, 3): a Gaussian 1 on a straight rim that turns by a right angle,
     and, but for the cube of the cosine, on a plane base; the inverse square (s / h)^2 at a great height h
