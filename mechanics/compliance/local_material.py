@@ -67,10 +67,10 @@ def punch_factor(contact_radius_m: np.ndarray, skin: Skin, poisson_ratio: float)
 
 def patch_softness(width_m: float, skin: Skin, poisson_ratio: float) -> float:
     """Mean displacement of a Gaussian patch of that width over what it is without the skin."""
-    of_patch, share = np.polynomial.legendre.leggauss(200)
-    of_patch = 3 * (of_patch + 1)  # wavenumber times width; beyond 6 a patch has no part
-    weight = share * np.exp(-(of_patch**2))
-    soft = layer_softness(of_patch * skin.thickness_m / width_m, skin.modulus_ratio, poisson_ratio)
+    wave, share = np.polynomial.legendre.leggauss(200)
+    wave = 3 * (wave + 1)  # times the width; beyond 6 a patch has no part
+    weight = share * np.exp(-(wave**2))
+    soft = layer_softness(wave * skin.thickness_m / width_m, skin.modulus_ratio, poisson_ratio)
     return float((weight * soft).sum() / weight.sum() / skin.modulus_ratio)
 
 
