@@ -111,14 +111,14 @@ class Forward:
 
     def ideal(self, modulus: float) -> ForwardSettings:
         """Settings of the ideal model, with what it has under the tips."""
-        p, soft, touch = len(self.touches), self.places.softness, TouchTerms()
+        p, touch = len(self.touches), TouchTerms()
         beneath_skin(touch, self.model)
         return ForwardSettings(
             modulus=modulus,
             nu=self.model.material.poisson_ratio,
             far=self.places.far,
             bracing=self.places.bracing,
-            dent_ratio=np.ones(p) if soft is None else 1 / soft,
+            dent_ratio=1 / self.places.softness,
             onset=np.zeros(p),
             stiffness=np.ones(p),
             touch=touch,

@@ -85,7 +85,4 @@ def given_back(
     tip, nu, skin = model.tool.tip_radius_m, model.material.poisson_ratio, model.material.skin
     softness = surface_softness(model.mesh, model.surface_ratio, points, tip)
     felt = softness if skin is None else softness * patch_softness(width_m, skin, nu)
-    back = np.zeros((len(points), 3, 3))
-    for k in np.flatnonzero(felt != 1):
-        back[k] = (1 - felt[k]) * half_space_compliance(normals[k], nu, width_m)
-    return softness, back
+    return softness, (1 - felt)[:, None, None] * half_space_compliance(normals, nu, width_m)

@@ -32,8 +32,7 @@ class Places:
 
     point, normal: (p, 3). frame: (p, 3, 3) rows normal, tangent, tangent. far: (p, 3, 3) far field in those
     frames, unit modulus, 1/m. curvature, bracing, braced: (p,) 1/m (TouchSites). softness: (p,) of the
-    material under each tip (local_material.given_back), 1 where None. stages: what effects asked to compute,
-    by name.
+    material under each tip (local_material.given_back). stages: what effects asked to compute, by name.
     """
 
     model: Model
@@ -44,7 +43,7 @@ class Places:
     curvature: np.ndarray
     bracing: np.ndarray
     braced: np.ndarray
-    softness: np.ndarray | None = None
+    softness: np.ndarray
     stages: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -77,7 +76,7 @@ class Places:
         """Those of some presses (p,) bool; stages are computed anew where any is left out."""
         if presses.all():
             return self
-        own = ["point", "normal", "frame", "far", *BENT_BY, *([] if self.softness is None else ["softness"])]
+        own = ("point", "normal", "frame", "far", *BENT_BY, "softness")
         return replace(self, **{name: getattr(self, name)[presses] for name in own}, stages={})
 
     def stored(self, name: str, build: Callable[[], Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
@@ -116,8 +115,11 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
 
     sites = _stored("sites", model, point, normal, solve)
     far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][place], frame)
-    rest = {name: each[place] for name, each in sites.items() if name != "far"}
-    return Places(model, point, normal, frame, np.ascontiguousarray(far), **rest, stages=stages)
+    bent = {name: sites[name][place] for name in BENT_BY}
+    softness = sites["softness"][place] if "softness" in sites else np.ones(len(place))
+    return Places(
+        model, point, normal, frame, np.ascontiguousarray(far), **bent, softness=softness, stages=stages
+    )
 
 
 def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
@@ -125,7 +127,8 @@ def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
     frame = presses.frame
     far = np.ascontiguousarray(np.einsum("pij,pjk,plk->pil", frame, sites.far, frame))
     bent = {name: getattr(sites, name) for name in BENT_BY}
-    return Places(model, presses.point, presses.normal, frame, far, **bent)
+    even = np.ones(len(presses.point))
+    return Places(model, presses.point, presses.normal, frame, far, **bent, softness=even)
 
 
 def _shared(point: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

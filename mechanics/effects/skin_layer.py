@@ -44,10 +44,9 @@ def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     places, skin = scene.places, Skin(**_report(values, scene, settings.modulus))
     _set(settings.touch, skin, places.model)
-    thickness, depth = skin.thickness_m, energy_fields(places).depth
-    inside = np.clip(thickness / np.maximum(depth, 1e-6), 0, 1) * (depth < 2 * thickness)
+    fields, thickness = energy_fields(places), skin.thickness_m
+    inside = np.clip(thickness / np.maximum(fields.depth, 1e-6), 0, 1) * (fields.depth < 2 * thickness)
     changed = far_with_weights(places, 1 + inside * (1 / skin.modulus_ratio - 1))
-    fields = energy_fields(places)
     local = 1 - patch_softness(fields.width_m, skin, places.model.material.poisson_ratio)
     settings.far = settings.far + changed - places.far + local * fields.half_space
 

@@ -27,7 +27,9 @@ def _places(edge_cells: int) -> Places:
     point = np.array([[x + centre[0], y + centre[1], 0.02] for x in AT_M for y in AT_M])
     normal = np.tile(UP, (len(point), 1))
     nothing = np.zeros((len(point), 3, 3))
-    return Places(model, point, normal, local_frames(normal), nothing, *np.zeros((3, len(point))))
+    return Places(
+        model, point, normal, local_frames(normal), nothing, *np.zeros((3, len(point))), np.ones(len(point))
+    )
 
 
 def _field(places: Places, log_sd: float, seed: int) -> np.ndarray:

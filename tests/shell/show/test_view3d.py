@@ -240,24 +240,31 @@ def test_a_screen_of_4k_is_used_and_read_from_as_far(tab, written):
     assert float(letters.removesuffix("px")) >= 20
 
 
+def object_drawn(shown, tmp_path, solid, across, wide=1, **view):
+    """(h, 3) colours down a column of the view, wide px and averaged, and the rows in which a solid that
+    stands on z = 0 is seen. across: where in the view's width."""
+    solid.apply_translation([0, 0, -solid.bounds[0, 2]])
+    seen = View(
+        Thing(solid.vertices, solid.faces, solid.vertices[:, 2] > 1e-6, np.zeros(3), np.array([0, 0, 1.0])),
+        np.array([[0, 0, solid.bounds[1, 2]]]),
+        [Colouring(ORDER, None, np.array([1.0]), "in order")],
+        **view,
+    )
+    page = Page("A solid")
+    page.view(seen, Figure(figsize=(3, 2)), "The picture.")
+    shown.open(page.write(tmp_path / "solid.html"))
+    shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
+    shown.wait("document.querySelector('.stage').dataset.azimuth")
+    left, top, width, height = stage(shown)
+    column = pixels(shown, left + across * width - wide // 2, top, wide, height).mean(axis=1)
+    return column, np.flatnonzero(column[:, 0] - column[:, 2] > 15)  # the floor is grey
+
+
 @needs_browser
 def test_the_rim_of_a_foot_is_lit_as_the_side_is(shown, tmp_path):
     """The bottom's triangles, which are uneven at the rim, darkened it in teeth."""
     wall = trimesh.creation.cylinder(RADIUS, 0.04, sections=64).subdivide().subdivide()
-    wall.apply_translation([0, 0, 0.02])
-    seen = View(
-        Thing(wall.vertices, wall.faces, wall.vertices[:, 2] > 1e-6, np.zeros(3), np.array([0, 0, 1.0])),
-        RADIUS * np.array([[0, 0, 4 / 3]]),
-        [Colouring(ORDER, None, np.array([1.0]), "in order")],
-    )
-    page = Page("A cylinder")
-    page.view(seen, Figure(figsize=(3, 2)), "The picture.")
-    shown.open(page.write(tmp_path / "cylinder.html"))
-    shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
-    shown.wait("document.querySelector('.stage').dataset.azimuth")
-    left, top, width, height = stage(shown)
-    column = pixels(shown, left + width / 2 - 1, top, 2, height).mean(axis=1)
-    beige = np.flatnonzero(column[:, 0] - column[:, 2] > 15)  # the floor is grey
+    column, beige = object_drawn(shown, tmp_path, wall, 0.5, wide=2)
     foot, above = column[beige[-1] - 4], column[beige[-1] - 60]
     assert foot.mean() > 0.97 * above.mean()
 
@@ -266,21 +273,8 @@ def test_the_rim_of_a_foot_is_lit_as_the_side_is(shown, tmp_path):
 def test_the_edges_of_a_block_are_sharp(shown, tmp_path):
     """A pale band ran along them, as wide as the triangles beside them."""
     block = trimesh.creation.box((0.06, 0.06, 0.03)).subdivide().subdivide()
-    block.apply_translation([0, 0, 0.015])
-    seen = View(
-        Thing(block.vertices, block.faces, block.vertices[:, 2] > 1e-6, np.zeros(3), np.array([0, 0, 1.0])),
-        np.array([[0, 0, 0.03]]),
-        [Colouring(ORDER, None, np.array([1.0]), "in order")],
-        azimuth_deg=0.0,
-    )
-    page = Page("A block")
-    page.view(seen, Figure(figsize=(3, 2)), "The picture.")
-    shown.open(page.write(tmp_path / "block.html"))
-    shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
-    shown.wait("document.querySelector('.stage').dataset.azimuth")
-    left, top, width, height = stage(shown)
-    column = pixels(shown, left + 0.45 * width, top, 1, height)[:, 0]
-    light = column[column[:, 0] - column[:, 2] > 15].mean(axis=1)  # the floor is grey
+    column, beige = object_drawn(shown, tmp_path, block, 0.45, azimuth_deg=0.0)
+    light = column[beige].mean(axis=1)
     of_faces = np.abs(light[:, None] - [light[10], light[-10]]).min(axis=1)
     assert abs(light[10] - light[-10]) > 10, "the top and a side are seen"
     assert (of_faces > 6).sum() < 6
