@@ -19,6 +19,7 @@ from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.statistics import weighted_quantile
 from palpate.reconstruction.checks.finding import ALL_THE_SAME, SURE_ODDS, Finding, Way, p_words, sure
 from palpate.reconstruction.checks.samples import Samples, Units
+from palpate.reconstruction.steps.s3_contacts.first_touch import CLEAR
 
 READINGS = {
     "time": {"s": 1.0, "ms": 1e3, "us": 1e6},
@@ -181,6 +182,8 @@ def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:
     depth, peak = (np.linalg.norm(v, axis=1) for v in (touches.travel, touches.push))
     rise = data.t[touches.peak] - data.t[touches.start]
     good = (depth > max(3 * float(data.step[:3].max()), _LEAST_M)) & (rise > 0)
+    # what barely leaves the noise is felt late and lost early
+    good &= peak > CLEAR * data.filtered.least * data.spread_n
     if good.sum() > 3:
         plane = 4 / 3 * np.sqrt(radius) * depth[good] ** 1.5
         found |= {

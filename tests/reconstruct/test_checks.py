@@ -182,3 +182,15 @@ def test_a_force_in_another_unit_is_asked_about_where_the_geometry_is_stated(cyl
     found = checked_samples(dataclasses.replace(cylinder[0], **alike), by_hand=False).found
     assert [f.name for f in found] == ["force unit"] * (factor != 1.0)
     assert not any(f.grave for f in found)
+
+
+def test_presses_that_barely_leave_the_noise_say_nothing_of_a_depth(cylinder):
+    """They are felt late and lost early: depths of a tenth of what was pressed, and no fault of a unit."""
+    recording = cylinder[0]
+    force = recording.force_on_tool
+    size = np.linalg.norm(force, axis=1)
+    loud = 0.22 * float(np.quantile(size[size > 0.1], 0.9))
+    noisy = force + np.random.default_rng(6).normal(0.0, loud, force.shape)
+    seen = measured(Samples(dataclasses.replace(recording, force_on_tool=noisy, force_noise_std_n=loud)))
+    depth = measured(Samples(recording))["depth"]
+    assert seen.get("depth", depth) == pytest.approx(depth, rel=0.5)

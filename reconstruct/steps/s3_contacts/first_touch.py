@@ -30,7 +30,7 @@ from palpate.reconstruction.steps.s3_contacts.on_support import on_it, recognise
 from palpate.reconstruction.steps.s3_contacts.single_press import FoundPress, fitted_touch, paper_touch
 
 PAPER_THRESHOLD_N = 1.0
-_CLEAR = 1.5
+CLEAR = 1.5
 """Presses must reach so many thresholds in the middle: else most were lost, and the loudest mislead."""
 _ABOVE = 10.0
 """Standard deviations of the filtered force that a cycle's peak stands above the minima beside it."""
@@ -285,7 +285,7 @@ def _check_loudness(
     if request.method != "noise" or request.threshold_n is not None or not touches:
         return
     middle = np.median(signals.magnitude[[c.peak for c in touches]])
-    if middle < _CLEAR * threshold_n:
+    if middle < CLEAR * threshold_n:
         raise LoudAirError(
             f"the presses reach {middle:.2g} N in the middle, where free motion alone reaches "
             f"{threshold_n:.2g} N: weaker ones are lost; press deeper"
