@@ -18,7 +18,7 @@ from palpate.diagnosis.search.limits import SEEN
 from palpate.mechanics.errors import SceneError
 from palpate.robot import LaboratoryRobot
 from palpate.scenes.laboratory.curves import ALONE
-from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.presses import PlannedTouch
 from palpate.scenes.laboratory.session import SimulateOptions, Staging
 from palpate.scenes.laboratory.simulate import simulate
 
@@ -61,7 +61,7 @@ class Sealed:
         return {self.cause: self.strength} if self.cause else {}
 
 
-def places_of(it: Thing) -> tuple[Touch, ...]:
+def places_of(it: Thing) -> tuple[PlannedTouch, ...]:
     """The straight press of each place."""
     return tuple(place[0] for place in it.places)
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from palpate.batching.plan import STEPS, Batch, Choice, batch
+from palpate.batching.plan import STEPS, Batch, BatchChoice, batch
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.recording.files import recording_files
 
@@ -63,7 +63,7 @@ def cost(sources: Sequence[str | Path], place: Path) -> dict[str, Any]:
     made: dict[str, Any] = {}
     rows: list[list[Any]] = []
     for reports in (True, False):
-        result = batch(sources, place / f"cost-{reports}", Choice(reports=reports))
+        result = batch(sources, place / f"cost-{reports}", BatchChoice(reports=reports))
         _all_done(result)
         total = 0.0
         words = "with reports" if reports else "without"

@@ -39,7 +39,7 @@ from palpate.scenes.conformance.kit import write_kit
 from palpate.scenes.conformance.truth import alone
 from palpate.scenes.laboratory.mesh import boundary_faces
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom
 
 FINENESS = Fineness(1.2, 6.0, 0.45)
@@ -162,7 +162,7 @@ def in_laboratory(body: Body) -> np.ndarray:
     solved = body.solved
     faces, _ = boundary_faces(solved.tetrahedra.astype(int))
     thing = Phantom(body.name, body.name, solved.points, faces, 1.0, POISSON)
-    at = Surface(1e3 * thing.vertices, thing.faces).nearest(1e3 * solved.place)[0][0]
+    at = TriangleSurface(1e3 * thing.vertices, thing.faces).nearest(1e3 * solved.place)[0][0]
     specimen = Specimen(POISSON, 1e3 * TIP_M)
     problem = build(thing, specimen, at, travel=0.0, fineness=FINENESS)
     radius, force, depth = 1e3 * TIP_M, [], 0.0

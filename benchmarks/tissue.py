@@ -28,10 +28,10 @@ from palpate.mechanics.shape.tetmesh import TetMesh, box_mesh
 from palpate.output import progress_bar
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.render.replay import rms_n
-from palpate.scenes.laboratory.curves import Curve, PathJob, Solving, curves
-from palpate.scenes.laboratory.effects import Bench, effect
+from palpate.scenes.laboratory.curves import PathJob, SolvedPath, Solving, curves
+from palpate.scenes.laboratory.effects import EffectContext, effect
 from palpate.scenes.laboratory.specimen import Fineness, Specimen
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom, column, rectangle, stacked
 
 CHEAP = Fineness(finest=3.0, reach=5.0, growth=1.2)
@@ -47,7 +47,7 @@ class RobotTissue:
     touch; curves: one a place, for unit modulus; modulus_pa: of the matrix; about: what was drawn."""
 
     centre: np.ndarray
-    curves: tuple[Curve, ...]
+    curves: tuple[SolvedPath, ...]
     modulus_pa: float
     height_m: float
     tip_radius_m: float
@@ -93,7 +93,7 @@ def robot_tissue(seed: int, *, places: int | None = None, solving: Solving | Non
     phantom = _phantom(rng, np.array([along - 1, across - 1]) * spacing + 2 * _WALL_M, height)
     strength = rng.uniform(0.6, 1.4)
     varies = effect("stiffness_field")
-    keys = varies.parameters(strength, Bench(phantom, phantom.young_modulus_pa, tip, (), rng))
+    keys = varies.parameters(strength, EffectContext(phantom, phantom.young_modulus_pa, tip, (), rng))
     assert varies.in_solid is not None
     specimen = varies.in_solid(Specimen(tip_radius=1e3 * tip), keys)
     points, normals = _touched(phantom, rng, along, across, spacing)
@@ -147,7 +147,7 @@ def _touched(
     x, y = ((np.arange(n) - (n - 1) / 2) * spacing for n in (along, across))
     flat = np.array([[a, b] for a in x for b in y]) + rng.normal(0, 0.0003, (along * across, 2))
     above = 1e3 * np.column_stack([flat, np.full(len(flat), phantom.height_m)])
-    surface = Surface(phantom.vertices * 1e3, phantom.faces)
+    surface = TriangleSurface(phantom.vertices * 1e3, phantom.faces)
     points = surface.nearest(above)[0].round(3)
     return points, surface.normals(points)
 

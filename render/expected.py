@@ -30,7 +30,7 @@ def greatest_difference(curve: Curve, expected: Curve) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class _Way:
+class _Press:
     """A press: deepest (3,) m, of the tip's centre; direction (3,) from the start to it."""
 
     deepest: np.ndarray
@@ -42,7 +42,7 @@ class _Way:
     step_s: float
 
 
-def _way(curve: Curve) -> _Way:
+def _way(curve: Curve) -> _Press:
     steps_s = np.diff(curve.t)
     lengths = np.linalg.norm(np.diff(curve.position, axis=0), axis=1)
     moving = lengths > 0
@@ -51,7 +51,7 @@ def _way(curve: Curve) -> _Way:
     line = deepest - curve.position[0]
     held = np.flatnonzero(curve.depth >= curve.depth.max() * (1 - 1e-9))
     before = curve.position[: max(int(np.argmax(curve.depth > 0)), 1)]
-    return _Way(
+    return _Press(
         deepest,
         line / max(float(np.linalg.norm(line)), 1e-12),
         float(curve.depth.max()),

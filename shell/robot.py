@@ -30,10 +30,10 @@ from palpate.mechanics.errors import RecordingError, SceneError
 from palpate.mechanics.options import option
 from palpate.mechanics.shape.nearest import closest, first_hits
 from palpate.scenes.laboratory.curves import ALONE, Solving
-from palpate.scenes.laboratory.effects import Readings, effect
+from palpate.scenes.laboratory.effects import SensedSamples, effect
 from palpate.scenes.laboratory.frame import quaternions
 from palpate.scenes.laboratory.hand import HandOptions, minimum_jerk
-from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.presses import PlannedTouch
 from palpate.scenes.laboratory.session import SimulateOptions, Staging
 from palpate.scenes.laboratory.simulate import Simulation, simulate
 from palpate.scenes.laboratory.support_and_air import on_the_support, waving
@@ -132,7 +132,7 @@ class LaboratoryRobot:
         options: SimulateOptions | None = None,
         robot: RobotOptions | None = None,
         solving: Solving | None = None,
-        places: Sequence[Touch] | None = None,
+        places: Sequence[PlannedTouch] | None = None,
     ) -> None:
         self.phantom, self.effects, self.seed = phantom, dict(effects or {}), seed
         self.options = options or SimulateOptions()
@@ -141,7 +141,7 @@ class LaboratoryRobot:
         self._solving = solving or ALONE
         self._surface = trimesh.Trimesh(phantom.vertices, phantom.faces, process=False)
         self._rng = np.random.default_rng([seed, 16])
-        self._touches: list[Touch] = []
+        self._touches: list[PlannedTouch] = []
         self._places = places
         self._left: np.ndarray | None = None
         self.made = 0
@@ -187,7 +187,7 @@ class LaboratoryRobot:
             start = int(np.flatnonzero(made.motion.touch == len(new) - 2)[-1]) + 1
         return self._part(made, "press", start, int(rows[-1]) + 1)
 
-    def _simulated(self, touches: list[Touch], seed: int) -> Simulation:
+    def _simulated(self, touches: list[PlannedTouch], seed: int) -> Simulation:
         self.last = simulate(
             self.phantom,
             self.effects,
@@ -212,7 +212,7 @@ class LaboratoryRobot:
             way = [0, 0, float(self._surface.vertices[:, 2].max()) + 0.06] + 1e-3 * aside
             force = np.zeros_like(way)
         axes, all_of_it = Rotation.from_rotvec(turn).as_matrix(), np.ones(len(way), dtype=bool)
-        readings = Readings(np.arange(len(way)) / RATE_HZ, way, force, axes, all_of_it)
+        readings = SensedSamples(np.arange(len(way)) / RATE_HZ, way, force, axes, all_of_it)
         known = {} if self.last is None else dict(self.last.truth["parameters"])
         for name in self.effects:
             read = effect(name).on_readings
@@ -234,7 +234,7 @@ class LaboratoryRobot:
         self._left = position[-1]
         return Segment(kind, r.t[start:end], position, r.force_on_tool[start:end], turned)
 
-    def _aside(self) -> Touch:
+    def _aside(self) -> PlannedTouch:
         if self._places is not None:
             return replace(self._places[0], depth=1.0)
         # the middle of a face: a ray that meets a vertex or an edge may pass between its faces
@@ -242,7 +242,7 @@ class LaboratoryRobot:
         top = middles[np.argmax(middles[:, 2])]
         return self._landed(top + [0, 0, 0.02], np.array([0.0, 0.0, -1.0]), 0.001)
 
-    def _touch(self, suggestion: Suggestion) -> Touch:
+    def _touch(self, suggestion: Suggestion) -> PlannedTouch:
         assert suggestion.point is not None and suggestion.normal is not None
         rng, error = self._rng, self.robot
         turn = np.radians(error.way_error_deg) * rng.normal(size=3)
@@ -257,14 +257,14 @@ class LaboratoryRobot:
             touch = self._landed(suggestion.point + off + 0.05 * suggestion.normal, way, depth)
         return replace(touch, speed=speed, hold=suggestion.hold_s)
 
-    def _nearest(self, point_mm: np.ndarray, depth_mm: float) -> Touch:
+    def _nearest(self, point_mm: np.ndarray, depth_mm: float) -> PlannedTouch:
         assert self._places is not None
         touch = min(self._places, key=lambda p: float(np.linalg.norm(p.point - point_mm)))
         visits = sum(t.site == touch.site for t in self._touches)
         depth = float(np.clip(depth_mm, 0.5, max(touch.reach, touch.depth)))
         return replace(touch, depth=depth, repeat=visits)
 
-    def _landed(self, start: np.ndarray, way: np.ndarray, depth: float) -> Touch:
+    def _landed(self, start: np.ndarray, way: np.ndarray, depth: float) -> PlannedTouch:
         """The touch of a tip that comes from `start` along `way` until it feels something, then `depth` m."""
         surface = self._surface
         far, face = (x[0] for x in first_hits(surface.vertices, surface.faces, start[None], way[None]))
@@ -283,7 +283,7 @@ class LaboratoryRobot:
         if -way @ normal < np.cos(np.radians(35)):
             # steeper than a tip holds: it turns towards the surface that it feels
             way = -normal
-        return Touch(
+        return PlannedTouch(
             site=len(self._touches),
             point=np.round(1e3 * point, 3),
             normal=normal / np.linalg.norm(normal),

@@ -9,12 +9,12 @@ import numpy as np
 
 from benchmarks.varied.draws import Draw
 from palpate.mechanics.recording.recording import Recording
-from palpate.scenes.laboratory.effects import Readings, effect
+from palpate.scenes.laboratory.effects import SensedSamples, effect
 from palpate.scenes.laboratory.frame import quaternions
 from palpate.scenes.laboratory.hand import band_noise
 
 
-def weighed(readings: Readings, draw: Draw) -> Readings:
+def weighed(readings: SensedSamples, draw: Draw) -> SensedSamples:
     """With the tool's weight and inertia, before any effect of the instrument; its axis as it is held."""
     if draw.orientation == "constant":
         readings = replace(readings, axes=np.repeat(readings.axes[:1], len(readings.t), axis=0))
@@ -24,7 +24,7 @@ def weighed(readings: Readings, draw: Draw) -> Readings:
 
 
 def logged(
-    readings: Readings,
+    readings: SensedSamples,
     draw: Draw,
     *,
     within_s: tuple[float, float],

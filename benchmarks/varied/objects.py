@@ -16,7 +16,7 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import first_hits
 from palpate.scenes.laboratory.curves import Solving
 from palpate.scenes.laboratory.paths import touch_forces
-from palpate.scenes.laboratory.presses import Touch, sites
+from palpate.scenes.laboratory.presses import PlannedTouch, sites
 from palpate.scenes.laboratory.solver import LabError
 from palpate.scenes.laboratory.specimen import Fineness, Specimen
 from palpate.scenes.phantoms import Phantom
@@ -52,7 +52,7 @@ class Thing:
     number: int
     phantom: Phantom
     tip_radius_m: float
-    places: tuple[tuple[Touch, ...], ...]
+    places: tuple[tuple[PlannedTouch, ...], ...]
 
 
 @lru_cache(maxsize=4)
@@ -81,7 +81,7 @@ def thickness(phantom: Phantom, points: np.ndarray, normals: np.ndarray) -> np.n
 
 def _touches(
     site: int, point: np.ndarray, normal: np.ndarray, reach: float, rng: np.random.Generator
-) -> tuple[Touch, ...]:
+) -> tuple[PlannedTouch, ...]:
     across = rng.normal(size=3)
     across -= (across @ normal) * normal
     across /= np.linalg.norm(across)
@@ -89,11 +89,11 @@ def _touches(
     tilted = -np.cos(tilt) * normal + np.sin(tilt) * across
     side = round(rng.uniform(1.75, 3.5) * 4) / 4 * across
     none = np.zeros(3)
-    found = [Touch(site, point, normal, "press", reach, -normal, none, reach=reach)]
+    found = [PlannedTouch(site, point, normal, "press", reach, -normal, none, reach=reach)]
     if site % OBLIQUE_EVERY == 0:
-        found.append(Touch(site, point, normal, "oblique", reach, tilted, none, reach=reach))
+        found.append(PlannedTouch(site, point, normal, "oblique", reach, tilted, none, reach=reach))
     if site % DRAG_EVERY == 0:
-        found.append(Touch(site, point, normal, "drag", min(reach, DRAG_MM), -normal, side))
+        found.append(PlannedTouch(site, point, normal, "drag", min(reach, DRAG_MM), -normal, side))
     return tuple(found)
 
 

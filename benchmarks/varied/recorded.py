@@ -17,7 +17,7 @@ from palpate.mechanics.recording.segments import TimeSegment
 from palpate.scenes.laboratory.curves import ALONE, Solving
 from palpate.scenes.laboratory.hand import HandOptions, cohort_hand
 from palpate.scenes.laboratory.hand_path import Motion
-from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.presses import PlannedTouch
 from palpate.scenes.laboratory.session import SimulateOptions, Staging
 from palpate.scenes.laboratory.simulate import Simulation, simulate
 
@@ -62,7 +62,7 @@ def explored(
     it: Thing | None = None,
     sizes: bool = False,
     complete: bool = False,
-    more: Sequence[Touch] = (),
+    more: Sequence[PlannedTouch] = (),
     solving: Solving = ALONE,
 ) -> Varied:
     """The same, with nothing written. complete: by that protocol, whose parts are stated where phase I is.
@@ -112,7 +112,7 @@ def _stated(way: Motion, draw: Draw) -> tuple[TimeSegment, ...]:
     )
 
 
-def touches(it: Thing, draw: Draw) -> list[Touch]:
+def touches(it: Thing, draw: Draw) -> list[PlannedTouch]:
     """The drawn presses in the order in which they are made; a few are oblique or dragged."""
     rng = np.random.default_rng([23, draw.seed])
     distinct = int(np.clip(round(draw.presses * (1 - draw.repeat_share)), 4, len(it.places)))
@@ -124,7 +124,7 @@ def touches(it: Thing, draw: Draw) -> list[Touch]:
         order = np.argsort(np.linalg.norm(points[:, None] - heaps, axis=2).min(axis=1))
     chosen = order[:distinct]
     visits = np.concatenate([rng.permutation(chosen), rng.choice(chosen, draw.presses - distinct)])
-    found: list[Touch] = []
+    found: list[PlannedTouch] = []
     for k in visits:
         kinds = it.places[k]
         touch = kinds[int(rng.integers(len(kinds)))] if rng.random() < 0.3 else kinds[0]

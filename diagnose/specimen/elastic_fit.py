@@ -20,7 +20,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.special import ndtr
 
 from palpate.diagnosis.specimen.bench import MachineCycle, touched
-from palpate.diagnosis.specimen.way_in import JKR, DentLaw, WayFit, WayFitted, lasting, way_of
+from palpate.diagnosis.specimen.way_in import JKR, DentTables, WayFit, WayFitted, lasting, way_of
 from palpate.mechanics.contact.tip import Tip
 
 _SHARES = np.array(
@@ -122,7 +122,7 @@ def elastic_fit(
     shares = _SHARES[:1] if rigid else _SHARES
     tried = []
     for name in names:
-        law = DentLaw(name, tip, poisson_ratio, deep, pull_n)
+        law = DentTables(name, tip, poisson_ratio, deep, pull_n)
         for sloped in (False, True):
             fits = [WayFit(way, law, sloped, deep, peak, guess) for way in ways]
             tried.append(_Tried(fits, _along(fits, shares)))

@@ -22,14 +22,14 @@ _DECADES = 2.0
 
 
 @dataclass(frozen=True)
-class Way:
+class ThinnedWay:
     """One way in, thinned to even steps of force: travel (n,) m from any zero, push (n,) N over free air."""
 
     travel: np.ndarray
     push: np.ndarray
 
     @classmethod
-    def thinned(cls, u: np.ndarray, net: np.ndarray) -> Way:
+    def thinned(cls, u: np.ndarray, net: np.ndarray) -> ThinnedWay:
         """Of the rows (n,) m, (n,) N over free air that end at the peak."""
         top = float(net[-1])
         edges = np.linspace(_LOWEST * top, top, _POINTS + 1)
@@ -40,14 +40,14 @@ class Way:
         return cls(thin_u, thin_f)
 
 
-def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> Way:
+def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> ThinnedWay:
     """The way in to the peak of one press: (n,) m, (n,) N; onset: travel at first touch, m."""
     peak = int(np.argmax(force))
     u, f = travel[: peak + 1], force[: peak + 1]
     air = u < onset - 0.03 * (u[-1] - onset)
     net = f - (float(np.median(f[air])) if air.any() else float(f[0]))
     near = u > onset - 0.1 * (u[-1] - onset)
-    return Way.thinned(u[near], net[near])
+    return ThinnedWay.thinned(u[near], net[near])
 
 
 class _YieldingFit:
@@ -57,14 +57,14 @@ class _YieldingFit:
         self.depth = np.concatenate([[0.0], np.geomspace(1e-4, 3.0, 400) * deepest_m])
         self.unit = np.maximum.accumulate(tip.force(law, self.depth, 1.0, poisson_ratio))
 
-    def machines_share(self, ways: Sequence[Way], log_e: float, c: float) -> float:
+    def machines_share(self, ways: Sequence[ThinnedWay], log_e: float, c: float) -> float:
         """Of the travel in contact at the greatest force."""
         push = max(float(w.push.max()) for w in ways)
         dent = float(np.interp(push / np.exp(log_e), self.unit, self.depth))
         return c * push / max(c * push + dent, 1e-300)
 
     def solved(
-        self, ways: Sequence[Way], kept: Sequence[np.ndarray], log_e: float, yields: bool
+        self, ways: Sequence[ThinnedWay], kept: Sequence[np.ndarray], log_e: float, yields: bool
     ) -> tuple[float, float, list[np.ndarray]]:
         """(half the squares of what is kept, c, residual N of every row of each way) at one modulus."""
         c = 0.0
@@ -89,7 +89,7 @@ class _YieldingFit:
         return sum(float(((r * k) ** 2).sum()) for r, k in zip(left, kept, strict=True)), c, left
 
     def fitted(
-        self, ways: Sequence[Way], kept: Sequence[np.ndarray], log_e: float, yields: bool
+        self, ways: Sequence[ThinnedWay], kept: Sequence[np.ndarray], log_e: float, yields: bool
     ) -> tuple[float, float, list[np.ndarray]]:
         """(log E, c, residuals)."""
 
@@ -104,7 +104,7 @@ class _YieldingFit:
         return found, c, left
 
     def left_out(
-        self, ways: Sequence[Way], guess: float, yields: bool
+        self, ways: Sequence[ThinnedWay], guess: float, yields: bool
     ) -> tuple[tuple[float, float], list[tuple[float, float]], float]:
         """((log E, c) of all rows, those without each block of force, rms N of the blocks left out)."""
         blocks = [
@@ -131,7 +131,7 @@ class HeldOut:
 
 
 def held_out_laws(
-    ways: Sequence[Way],
+    ways: Sequence[ThinnedWay],
     poisson_ratio: float,
     tip: Tip,
     modulus_pa: float,
@@ -149,9 +149,9 @@ def held_out_laws(
     return found
 
 
-def _deepest(ways: Sequence[Way]) -> float:
+def _deepest(ways: Sequence[ThinnedWay]) -> float:
     return max(float(w.travel[-1] - w.travel[0]) for w in ways)
 
 
-def _rms(ways: Sequence[Way]) -> float:
+def _rms(ways: Sequence[ThinnedWay]) -> float:
     return float(np.sqrt(np.mean(np.concatenate([w.push for w in ways]) ** 2)))

@@ -29,7 +29,7 @@ JKR = "jkr"
 
 
 @dataclass(frozen=True)
-class Way:
+class WayReadings:
     """Readings (b,) of one way in: travel m from the first touch as it was told, force N over the level;
     weight: rows a reading is the mean of. level: whether it is fitted."""
 
@@ -39,7 +39,7 @@ class Way:
     level: bool
 
 
-class DentLaw:
+class DentTables:
     """One law of the dent at any modulus: (dent, force) tables that grow."""
 
     def __init__(self, name: str, tip: Tip, poisson_ratio: float, deepest_m: float, pull_n: float) -> None:
@@ -78,7 +78,9 @@ class WayFitted:
 class WayFit:
     """One way in by one law, its free air flat or sloped."""
 
-    def __init__(self, way: Way, law: DentLaw, sloped: bool, deep: float, peak: float, guess: float) -> None:
+    def __init__(
+        self, way: WayReadings, law: DentTables, sloped: bool, deep: float, peak: float, guess: float
+    ) -> None:
         self.low = float(np.log(guess)) - _DECADES / 2
         self.way, self.law, self.sloped, self.deep, self.peak = way, law, sloped, deep, peak
         self.root = np.sqrt(way.weight)
@@ -160,7 +162,7 @@ class WayFit:
         return float((missed[contact] ** 2).sum()), float((force[contact] ** 2).sum())
 
 
-def way_of(curve: MachineCycle, onset: float) -> Way:
+def way_of(curve: MachineCycle, onset: float) -> WayReadings:
     """Of a curve, the rows from some air to the peak, as means of as many rows each."""
     peak = int(np.argmax(curve.force))
     u, force = curve.travel[: peak + 1] - onset, curve.force[: peak + 1]
@@ -170,10 +172,10 @@ def way_of(curve: MachineCycle, onset: float) -> Way:
     count = len(u) // block
     u, force = (v[len(v) - count * block :].reshape(count, block).mean(axis=1) for v in (u, force))
     if curve.level_n is not None:
-        return Way(u, force - curve.level_n, float(block), False)
+        return WayReadings(u, force - curve.level_n, float(block), False)
     air = u < 0
     level = float(np.median(force[air])) if air.any() else float(force[0])
-    return Way(u, force - level, float(block), True)
+    return WayReadings(u, force - level, float(block), True)
 
 
 def lasting(left: np.ndarray) -> float:

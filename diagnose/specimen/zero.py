@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from palpate.diagnosis.specimen.bench import Bench, MachineCycle
-from palpate.diagnosis.specimen.machine_compliance import Way, held_out_laws
+from palpate.diagnosis.specimen.machine_compliance import ThinnedWay, held_out_laws
 from palpate.mechanics.contact.tip import Tip
 from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 
@@ -91,9 +91,9 @@ def _first(curve: MachineCycle) -> tuple[float, float]:
     return (float(np.median(early)), noise) if still else (float(early[:3].mean()), noise)
 
 
-def _way(curve: MachineCycle, level: float) -> Way:
+def _way(curve: MachineCycle, level: float) -> ThinnedWay:
     peak = int(np.argmax(curve.force))
-    return Way.thinned(curve.travel[: peak + 1], curve.force[: peak + 1] - level)
+    return ThinnedWay.thinned(curve.travel[: peak + 1], curve.force[: peak + 1] - level)
 
 
 def _first_guess(curve: MachineCycle, poisson_ratio: float, tip: Tip) -> float:

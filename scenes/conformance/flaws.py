@@ -10,12 +10,12 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate.scenes.conformance.cases import RATE_HZ, TIP_M
-from palpate.scenes.conformance.truth import Tip
+from palpate.scenes.conformance.truth import TipPath
 
-Plant = Callable[[Tip], np.ndarray]
+Plant = Callable[[TipPath], np.ndarray]
 
 
-def _deeper(tip: Tip, depth: np.ndarray) -> np.ndarray:
+def _deeper(tip: TipPath, depth: np.ndarray) -> np.ndarray:
     """(n, 3) N at other depths (n,) m: the force goes as depth^1.5, with the direction and level of the
     nearest sample that touches."""
     touching = np.flatnonzero(tip.way[:, 0] > 0)
@@ -28,7 +28,7 @@ def _deeper(tip: Tip, depth: np.ndarray) -> np.ndarray:
     return level * np.maximum(depth, 0.0)[:, None] ** 1.5
 
 
-def contact_stiffness(tip: Tip) -> np.ndarray:
+def contact_stiffness(tip: TipPath) -> np.ndarray:
     """A spring of 1500 N/m in the contact."""
     depth = tip.way[:, 0].copy()
     for _ in range(200):
@@ -37,23 +37,23 @@ def contact_stiffness(tip: Tip) -> np.ndarray:
     return _deeper(tip, depth)
 
 
-def contact_nodes(tip: Tip) -> np.ndarray:
+def contact_nodes(tip: TipPath) -> np.ndarray:
     """A patch of radius 1.5 mm that one node stands for: the contact is never smaller."""
     wider = 1.5e-3 / np.sqrt(TIP_M * np.maximum(tip.way[:, 0], 1e-6))
     return tip.force * (1 + (1.5 * wider[:, None]) ** 3) ** (1 / 3)
 
 
-def contact_offset(tip: Tip) -> np.ndarray:
+def contact_offset(tip: TipPath) -> np.ndarray:
     """A margin of 0.1 mm around the body."""
     return _deeper(tip, tip.way[:, 0] + 1e-4)
 
 
-def mesh_stiffness(tip: Tip) -> np.ndarray:
+def mesh_stiffness(tip: TipPath) -> np.ndarray:
     """Elements that lock: a fifth too stiff."""
     return 1.2 * tip.force
 
 
-def numerical_damping(tip: Tip) -> np.ndarray:
+def numerical_damping(tip: TipPath) -> np.ndarray:
     """A dashpot of 2 N s/m along the normal, which does not pull."""
     speed = np.gradient(tip.way[:, 0], 1 / RATE_HZ)
     push = np.maximum(tip.force @ tip.normal + 2.0 * speed, 0.0)
@@ -61,18 +61,18 @@ def numerical_damping(tip: Tip) -> np.ndarray:
     return tip.force + extra[:, None] * tip.normal
 
 
-def time_step(tip: Tip) -> np.ndarray:
+def time_step(tip: TipPath) -> np.ndarray:
     """Steps of 20 ms, each with the force of the one before."""
     late = np.floor(tip.t / 0.02 + 1e-9) * 0.02 - 0.02
     return np.column_stack([np.interp(late, tip.t, f) for f in tip.force.T])
 
 
-def lost_contact(tip: Tip) -> np.ndarray:
+def lost_contact(tip: TipPath) -> np.ndarray:
     """Every tenth sample without contact."""
     return np.where((np.arange(len(tip.t)) % 10 == 3)[:, None], 0.0, tip.force)
 
 
-def tunnelling(tip: Tip) -> np.ndarray:
+def tunnelling(tip: TipPath) -> np.ndarray:
     """The second press lets the tip through at six tenths of its depth."""
     deep, half = tip.way[:, 0] > 0.6 * tip.way[:, 0].max(), len(tip.t) // 2
     air = np.flatnonzero(tip.way[:half, 0] <= 0)[-1]
@@ -80,7 +80,7 @@ def tunnelling(tip: Tip) -> np.ndarray:
     return np.where((np.arange(len(tip.t)) >= through)[:, None], 0.0, tip.force)
 
 
-def force_law(tip: Tip) -> np.ndarray:
+def force_law(tip: TipPath) -> np.ndarray:
     """The force goes with the square of the depth, as a pressure field's; right at the deepest."""
     share = np.maximum(tip.way[:, :1], 0.0) / tip.way[:, 0].max()
     return tip.force * np.sqrt(share)

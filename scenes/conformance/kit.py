@@ -18,7 +18,7 @@ from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import FACES, lone_faces
 from palpate.scenes.conformance.cases import BODIES, FRICTION, POISSON, RATE_HZ, TIP_M, YOUNG_PA, Solved
 from palpate.scenes.conformance.flaws import FLAWS
-from palpate.scenes.conformance.truth import Tip, cases
+from palpate.scenes.conformance.truth import TipPath, cases
 
 HERE = Path(__file__).parent
 PHYSICS = {
@@ -86,7 +86,7 @@ def write_kit(path: Path | str, progress: Progress = silent) -> Made:
     return Made(Path(path), version, size, tuple(known))
 
 
-def _parts(known: dict[str, list[Tip]]) -> Iterator[dict[str, bytes]]:
+def _parts(known: dict[str, list[TipPath]]) -> Iterator[dict[str, bytes]]:
     tips = [tip for each in known.values() for tip in each]
     for body in BODIES:
         yield body_files(body.name, body.solved)
@@ -168,7 +168,7 @@ def _offsets(cells: int) -> str:
     )
 
 
-def readme(known: dict[str, list[Tip]], version: str) -> str:
+def readme(known: dict[str, list[TipPath]], version: str) -> str:
     """The kit's own words."""
     bodies = []
     for body in BODIES:

@@ -35,7 +35,7 @@ FLOOR_M = 2e-5
 
 
 @dataclass(frozen=True)
-class Tip:
+class TipPath:
     """One tip's path. name: of its files; t (n,) s; way (n, 2) m: below first touch, and slid; centre (n, 3)
     m; force (n, 3) N on the tool; bound (n,) N, half width of its length's 95 % interval."""
 
@@ -49,7 +49,7 @@ class Tip:
     bound: np.ndarray
 
 
-def cases() -> dict[str, list[Tip]]:
+def cases() -> dict[str, list[TipPath]]:
     """The tips of every case: one on each of the six bodies, then two on the half-space."""
     return {**{body.name: [alone(body)] for body in BODIES}, "two-tips": pair(BODIES[0])}
 
@@ -78,7 +78,7 @@ def mindlin(
     return np.where(slid > 0, low, 0.0)
 
 
-def alone(body: Body) -> Tip:
+def alone(body: Body) -> TipPath:
     """One tip on a body."""
     way, solved = strokes(body.depth_m), body.solved
     depth, slid = way.T
@@ -103,7 +103,7 @@ def _aside(body: Body) -> tuple[np.ndarray, float]:
     return gained / held, STUCK * body.depth_m / held - own
 
 
-def pair(body: Body) -> list[Tip]:
+def pair(body: Body) -> list[TipPath]:
     """Two tips on the half-space; the second comes while the first rests."""
     ways = [strokes(body.depth_m, slides=False, after_s=wait) for wait in (0.0, 0.06)]
     longest = max(map(len, ways))
@@ -129,10 +129,10 @@ def pair(body: Body) -> list[Tip]:
 
 def _tip(
     name: str, body: Body, place: np.ndarray, way: np.ndarray, force: np.ndarray, off: np.ndarray
-) -> Tip:
+) -> TipPath:
     normal, along = body.solved.normal, body.solved.along
     centre = place + (TIP_M - way[:, :1]) * normal + way[:, 1:] * along
     size = np.linalg.norm(force, axis=1)
     steep = 1.5 * size / np.maximum(way[:, 0], SHAPE_M)
     bound = off + MESH_SHARE * size + SHAPE_M * steep + hertz(np.array([FLOOR_M]))[0]
-    return Tip(name, body, normal, np.arange(len(way)) / RATE_HZ, way, centre, force, bound)
+    return TipPath(name, body, normal, np.arange(len(way)) / RATE_HZ, way, centre, force, bound)

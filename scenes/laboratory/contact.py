@@ -45,7 +45,7 @@ def _shapes(r: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 SHAPES, SLOPES = _shapes(POINTS[:, 0], POINTS[:, 1])
 
 
-class Grip:
+class Anchors:
     """Contact state of every quadrature point at a converged load step: anchors relative to the sphere's
     centre.
 
@@ -58,7 +58,7 @@ class Grip:
         self.anchor = np.zeros((points, 3))
         self.relative = np.full((points, 3), 1e6)
 
-    def let_go(self, new: Grip) -> bool:
+    def let_go(self, new: Anchors) -> bool:
         """Release the points held here that pull in `new`; they may still be pressed, but slide. Whether any
         were.
         """
@@ -66,16 +66,16 @@ class Grip:
         self.active = self.active & ~pulling
         return bool(pulling.any())
 
-    def settle(self, new: Grip) -> None:
+    def settle(self, new: Anchors) -> None:
         """Points that were expected but do not press in `new` slide in this step, should they press later.
 
         Held they would pull and free they would press: Newton's method would go to and fro for ever.
         """
         self.expected = self.expected & new.active
 
-    def copy(self) -> Grip:
+    def copy(self) -> Anchors:
         """An independent copy."""
-        twin = Grip(0)
+        twin = Anchors(0)
         for name in ("active", "expected", "anchor", "relative"):
             setattr(twin, name, getattr(self, name).copy())
         return twin
@@ -91,14 +91,14 @@ class SphereContact:
         tangents = np.einsum("qad,fax->fqdx", SLOPES, x)
         self.weights = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2) * WEIGHTS
 
-    def start(self, centre: np.ndarray) -> Grip:
+    def start(self, centre: np.ndarray) -> Anchors:
         """Nothing touches yet; the sphere's centre is at `centre` mm."""
-        grip = Grip(self.weights.size)
+        grip = Anchors(self.weights.size)
         x = np.einsum("qa,fax->fqx", SHAPES, self.points[self.faces]).reshape(-1, 3)
         grip.relative = x - centre
         return grip
 
-    def clear_of(self, centre: np.ndarray, grip: Grip) -> np.ndarray:
+    def clear_of(self, centre: np.ndarray, grip: Anchors) -> np.ndarray:
         """The nearest centre that clears the untouched object, straight away from what is touched now."""
         out = -grip.anchor[grip.active].sum(axis=0)
         out /= np.linalg.norm(out)
@@ -108,7 +108,7 @@ class SphereContact:
         way = along[inside > 0] + np.sqrt(inside[inside > 0])
         return centre + max(0.0, way.max(initial=0.0)) * out
 
-    def expect(self, displacement: np.ndarray, centre: np.ndarray, held: Grip) -> None:
+    def expect(self, displacement: np.ndarray, centre: np.ndarray, held: Anchors) -> None:
         """Give the points that `displacement` brings into the sphere the places where they meet it.
 
         With these anchors a point sticks within the load step in which it arrives, as if the step were small.
@@ -119,8 +119,8 @@ class SphereContact:
             _expect(x - centre, self.radius, held.active, held.expected, held.anchor, held.relative)
 
     def evaluate(
-        self, displacement: np.ndarray, centre: np.ndarray, old: Grip, tangent: bool, arrivals: bool = True
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Grip]:
+        self, displacement: np.ndarray, centre: np.ndarray, old: Anchors, tangent: bool, arrivals: bool = True
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Anchors]:
         """(face forces (k, 18) resisting, face stiffness (k, 18, 18) or empty, force on the sphere (3,),
         new grip).
 
@@ -130,7 +130,7 @@ class SphereContact:
         count = len(self.faces)
         forces = np.zeros((count, 18))
         stiffness = np.zeros((count if tangent else 0, 18, 18))
-        new = Grip(self.weights.size)
+        new = Anchors(self.weights.size)
         total = _evaluate(
             self.points, displacement, self.faces, self.weights, centre, self.radius, self.friction,
             old.active, old.expected, old.anchor, old.relative, new.active, new.anchor, new.relative,

@@ -38,7 +38,7 @@ LINEAR_STEP_MM = 0.2
 
 
 @dataclass(frozen=True)
-class Curve:
+class SolvedPath:
     """A solved path. travel: (k, 3) mm, the tip's centre since first touch; force: (k, 3) E mm^2, on the
     tip.
 
@@ -104,7 +104,7 @@ def solve(
     jobs: Sequence[PathJob],
     fineness: Fineness,
     cache: Path | None = None,
-) -> Iterator[Curve]:
+) -> Iterator[SolvedPath]:
     """March the tip along each job's path from an untouched solid; the jobs share one place and one mesh.
 
     Raises LabError where a state finds no equilibrium.
@@ -136,7 +136,7 @@ def solve(
             force[k], energy[k] = state.force, state.energy
             if job.times is None and np.linalg.norm(state.force) > 1e-6:
                 stiffness[k] = problem.tip_stiffness(state)
-        yield Curve(job.travel, force, stiffness, energy, job.times)
+        yield SolvedPath(job.travel, force, stiffness, energy, job.times)
 
 
 def _parts(before: np.ndarray, after: np.ndarray, longest: float) -> Iterator[tuple[np.ndarray, float]]:
@@ -166,11 +166,11 @@ def _work(
     return None
 
 
-def _load(path: Path) -> Curve | None:
+def _load(path: Path) -> SolvedPath | None:
     try:
         with np.load(path, allow_pickle=False) as stored:
             times = stored["times"] if "times" in stored else None
-            return Curve(stored["travel"], stored["force"], stored["stiffness"], stored["energy"], times)
+            return SolvedPath(stored["travel"], stored["force"], stored["stiffness"], stored["energy"], times)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
 
@@ -180,7 +180,7 @@ def curves(
     specimen: Specimen,
     jobs: Sequence[PathJob],
     solving: Solving = EVERY_CORE,
-) -> list[Curve]:
+) -> list[SolvedPath]:
     """Solve the jobs that are not in the cache, in parallel; an interrupted run goes on where it stopped.
 
     Raises LabError naming the touches that found no equilibrium.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 
 Field = tuple[tuple[tuple[float, ...], ...], tuple[tuple[float, float], ...], float]
 """waves: (amplitude of ln E, wave vector x, y, z in rad/mm, phase). layers: (thickness mm, ln of the modulus)
@@ -32,7 +32,7 @@ def ratio_at(field: Field, at: np.ndarray, vertices: np.ndarray, faces: np.ndarr
     points = at.reshape(-1, 3)
     depth = np.zeros(len(points))
     if field[1]:
-        surface = Surface(vertices, faces)
+        surface = TriangleSurface(vertices, faces)
         off_base = surface.corners[..., 2].max(axis=1) > 1e-6
-        depth = Surface(surface.vertices, surface.faces[off_base]).nearest(points)[1]
+        depth = TriangleSurface(surface.vertices, surface.faces[off_base]).nearest(points)[1]
     return np.exp(log_ratio(field, points, depth)).reshape(at.shape[:2])

@@ -18,7 +18,7 @@ import numpy as np
 from palpate.scenes.laboratory.curves import PathJob, Solving, curves
 from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT, TouchForce
-from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.presses import PlannedTouch
 from palpate.scenes.laboratory.specimen import Specimen
 from palpate.scenes.laboratory.tracing import RATE_HZ
 from palpate.scenes.phantoms import Phantom
@@ -37,7 +37,7 @@ FINE, COARSE = Spacing(0.15, 0.02), Spacing(0.6, 0.15)
 
 
 def solved_states(
-    motion: Motion, number: int, touch: Touch, spacing: Spacing
+    motion: Motion, number: int, touch: PlannedTouch, spacing: Spacing
 ) -> tuple[np.ndarray, np.ndarray]:
     """(samples (k,) at which touch `number` is solved, the tip's travel (k, 3) mm there)."""
     rows = np.flatnonzero(motion.touch == number)
@@ -65,7 +65,7 @@ def solved_states(
 def beyond_quasilinear(
     phantom: Phantom,
     specimen: Specimen,
-    touches: Sequence[Touch],
+    touches: Sequence[PlannedTouch],
     motion: Motion,
     quasilinear: np.ndarray,
     modulus_pa: float,

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from palpate.scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk, straying
 from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
-from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.presses import PlannedTouch
 from palpate.scenes.laboratory.support_and_air import on_the_support, waving
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.laboratory.tracing import RATE_HZ, Trace
 from palpate.scenes.phantoms import Phantom
 
@@ -49,7 +49,7 @@ class Motion:
 
 def motion(
     phantom: Phantom,
-    touches: Sequence[Touch],
+    touches: Sequence[PlannedTouch],
     traced: Trace,
     hand: HandOptions,
     radius: float,
@@ -60,7 +60,7 @@ def motion(
 
     again: after them three presses on the bare support, waving in the air, and the base traced once more, so.
     """
-    surface = Surface(phantom.vertices * 1e3, phantom.faces)
+    surface = TriangleSurface(phantom.vertices * 1e3, phantom.faces)
     middle = np.array([0.0, 0.0, 0.5e3 * phantom.height_m])
     clear = np.linalg.norm(surface.vertices - middle, axis=1).max() + radius + 8.0
     parts: list[dict[str, np.ndarray]] = [_still(traced.position)]
@@ -115,7 +115,7 @@ class _Done:
 
 
 def _beside(
-    surface: Surface, again: Trace, hand: HandOptions, radius: float, rng: np.random.Generator
+    surface: TriangleSurface, again: Trace, hand: HandOptions, radius: float, rng: np.random.Generator
 ) -> list[_Done]:
     """Presses on the support beside the object, waving above it, the base once more."""
     reach = float(np.linalg.norm(surface.vertices[:, :2], axis=1).max())
@@ -145,8 +145,8 @@ def _still(position: np.ndarray) -> dict[str, np.ndarray]:
 
 def _one_touch(
     number: int,
-    touch: Touch,
-    surface: Surface,
+    touch: PlannedTouch,
+    surface: TriangleSurface,
     hand: HandOptions,
     radius: float,
     rng: np.random.Generator,
@@ -218,7 +218,7 @@ def _hold(
 
 
 def _stray(
-    along: np.ndarray, leg: np.ndarray, touch: Touch, hand: HandOptions, rng: np.random.Generator
+    along: np.ndarray, leg: np.ndarray, touch: PlannedTouch, hand: HandOptions, rng: np.random.Generator
 ) -> np.ndarray:
     """Sideways straying since first touch (zero there and in the air)."""
     n = len(along)

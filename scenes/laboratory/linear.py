@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.mechanics.elastic.partial_factor import partial_factor
-from palpate.scenes.laboratory.contact import Grip, SphereContact
+from palpate.scenes.laboratory.contact import Anchors, SphereContact
 from palpate.scenes.laboratory.solid import Solid
 from palpate.scenes.laboratory.solver import Driven
 from palpate.scenes.laboratory.touching import Assembly, Touching
@@ -28,7 +28,7 @@ class LinearState:
     displacement: np.ndarray
     centre: np.ndarray
     force: np.ndarray
-    grip: Grip
+    grip: Anchors
     energy: float
     memory: np.ndarray
 

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.disk.scratch import cache_folder
 from palpate.mechanics.disk.writing import atomic_file, temporary_folder
 from palpate.mechanics.errors import MeshError
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom
 
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
@@ -180,7 +180,7 @@ def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray
             num_threads=1,
         )
     tetrahedra = _outward(points, tetrahedra.astype(np.int64))
-    surface = Surface(phantom.vertices * 1e3, phantom.faces)
+    surface = TriangleSurface(phantom.vertices * 1e3, phantom.faces)
     points = _snap(points, tetrahedra, surface)
     with atomic_file(path) as temporary:
         np.savez(temporary, points=points, tetrahedra=tetrahedra)
@@ -225,7 +225,7 @@ def _outward(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
     return tetrahedra
 
 
-def _snap(points: np.ndarray, tetrahedra: np.ndarray, surface: Surface) -> np.ndarray:
+def _snap(points: np.ndarray, tetrahedra: np.ndarray, surface: TriangleSurface) -> np.ndarray:
     """Boundary nodes moved onto the surface, except where that would flatten a tetrahedron."""
     shell = np.unique(boundary_faces(tetrahedra)[0])
     before = _volumes(points, tetrahedra)
@@ -256,7 +256,7 @@ class QuadraticMesh:
     base: np.ndarray
 
 
-def quadratic(points: np.ndarray, tetrahedra: np.ndarray, surface: Surface | None) -> QuadraticMesh:
+def quadratic(points: np.ndarray, tetrahedra: np.ndarray, surface: TriangleSurface | None) -> QuadraticMesh:
     """Mid-edge nodes added; those of boundary edges lie on the true surface where the elements stay valid."""
     n = len(points)
     edges = np.sort(tetrahedra[:, _EDGES].reshape(-1, 2), axis=1)
@@ -284,7 +284,12 @@ def quadratic(points: np.ndarray, tetrahedra: np.ndarray, surface: Surface | Non
 
 
 def _bend(
-    points: np.ndarray, cells: np.ndarray, mids: np.ndarray, edges: np.ndarray, corners: int, surface: Surface
+    points: np.ndarray,
+    cells: np.ndarray,
+    mids: np.ndarray,
+    edges: np.ndarray,
+    corners: int,
+    surface: TriangleSurface,
 ) -> np.ndarray:
     target, distance, _ = surface.nearest(points[mids])
     ends = points[edges[mids - corners]]
@@ -337,7 +342,7 @@ def graded_mesh(
     balls: (centre, radius) mm of inclusions, which are resolved by elements of half their radius.
     """
     points, tetrahedra = coarse_mesh(phantom, cache)
-    surface = Surface(phantom.vertices * 1e3, phantom.faces)
+    surface = TriangleSurface(phantom.vertices * 1e3, phantom.faces)
     rim = round_rim(phantom)
     near_rim = cKDTree(rim) if len(rim) else None
 

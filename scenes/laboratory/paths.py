@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from palpate.scenes.laboratory.curves import EVERY_CORE, LOADING, Curve, PathJob, Solving, curves
-from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.curves import EVERY_CORE, LOADING, PathJob, SolvedPath, Solving, curves
+from palpate.scenes.laboratory.presses import PlannedTouch
 from palpate.scenes.laboratory.specimen import Specimen
 from palpate.scenes.phantoms import Phantom
 
@@ -79,7 +79,7 @@ class TouchForce:
         return force, stiffness
 
 
-def _in_and_out(touch: Touch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _in_and_out(touch: PlannedTouch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(travel (k, 3), leg numbers, s) of one touch's whole path, from 0 to beyond separation."""
     way_in = LOADING * touch.depth
     travel, leg, s = [way_in[:, None] * touch.direction], [np.zeros(len(way_in), int)], [way_in]
@@ -97,7 +97,9 @@ def _in_and_out(touch: Touch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.vstack(travel), np.concatenate(leg), np.concatenate(s)
 
 
-def _touch_force(curve: Curve, rows: np.ndarray, leg: np.ndarray, s: np.ndarray, depth: float) -> TouchForce:
+def _touch_force(
+    curve: SolvedPath, rows: np.ndarray, leg: np.ndarray, s: np.ndarray, depth: float
+) -> TouchForce:
     force, stiffness = curve.force[rows], curve.stiffness[rows]
 
     def part(number: int) -> Leg:
@@ -116,7 +118,7 @@ def _touch_force(curve: Curve, rows: np.ndarray, leg: np.ndarray, s: np.ndarray,
 def touch_forces(
     phantom: Phantom,
     specimen: Specimen,
-    touches: Sequence[Touch],
+    touches: Sequence[PlannedTouch],
     solving: Solving = EVERY_CORE,
 ) -> list[TouchForce]:
     """The force of every touch, for a modulus of 1; solved where the cache does not hold it.
@@ -160,7 +162,7 @@ def touch_forces(
 
 
 def _by_site(
-    phantom: Phantom, specimen: Specimen, touches: Sequence[Touch], solving: Solving
+    phantom: Phantom, specimen: Specimen, touches: Sequence[PlannedTouch], solving: Solving
 ) -> list[TouchForce]:
     jobs, members = [], []
     for site in sorted({t.site for t in touches}):

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.errors import OptionError, SceneError
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom
 
 
@@ -51,7 +51,7 @@ RIM_MM, FLOOR_MM = 9.0, 13.0
 
 
 @dataclass(frozen=True)
-class Touch:
+class PlannedTouch:
     """One touch: site number, point and normal (object frame), and the tip's travel from first touch.
 
     kind: "press" (straight along -n), "oblique" (straight, tilted), "drag" (along -n, then sideways).
@@ -77,7 +77,7 @@ class Touch:
 
 def sites(phantom: Phantom, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """(points (k, 3), outward normals (k, 3)): spread by farthest-point sampling over what a hand reaches."""
-    surface = Surface(phantom.vertices * 1e3, phantom.faces)
+    surface = TriangleSurface(phantom.vertices * 1e3, phantom.faces)
     centres, normals = surface.corners.mean(axis=1), surface.face_normals
     bottom, top = FLOOR_MM, centres[:, 2].max()
     reachable = (centres[:, 2] > bottom) & (normals[:, 2] > -0.25)
@@ -106,7 +106,7 @@ def sites(phantom: Phantom, count: int, rng: np.random.Generator) -> tuple[np.nd
     return on, surface.normals(on)
 
 
-def _rims(surface: Surface) -> np.ndarray:
+def _rims(surface: TriangleSurface) -> np.ndarray:
     """Points along edges where the surface turns by more than 25 degrees."""
     faces = surface.faces
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -119,7 +119,7 @@ def _rims(surface: Surface) -> np.ndarray:
     return surface.vertices[edges[:-1][sharp]].mean(axis=1)
 
 
-def press_set(phantom: Phantom, protocol: str, number: int) -> list[Touch]:
+def press_set(phantom: Phantom, protocol: str, number: int) -> list[PlannedTouch]:
     """The touches of one exploration, in the order in which they are made.
 
     Raises OptionError for an unknown protocol.
@@ -133,7 +133,7 @@ def press_set(phantom: Phantom, protocol: str, number: int) -> list[Touch]:
     thickest = plan.thickness * 1e3 * phantom.height_m
     greatest = min(plan.greatest_depth, thickest)
     depths = np.round(rng.uniform(min(plan.least_depth, greatest), greatest, len(points)) * 4) / 4
-    touches: list[Touch] = []
+    touches: list[PlannedTouch] = []
     for k in range(len(points)):
         touches.append(_touch(k, points[k], normals[k], "press", depths[k], rng))
         share = rng.random()
@@ -163,7 +163,7 @@ def _shallower(depth: float, rng: np.random.Generator) -> float:
     return max(1.0, round(depth * rng.uniform(0.65, 1.0) * 4) / 4)
 
 
-def _insert_after(touches: list[Touch], site: int) -> int:
+def _insert_after(touches: list[PlannedTouch], site: int) -> int:
     return max(i for i, t in enumerate(touches) if t.site == site) + 1
 
 
@@ -175,7 +175,7 @@ def _touch(
     depth: float,
     rng: np.random.Generator,
     repeat: int = 0,
-) -> Touch:
+) -> PlannedTouch:
     across = rng.normal(size=3)
     across -= (across @ normal) * normal
     across /= np.linalg.norm(across)
@@ -185,4 +185,4 @@ def _touch(
         direction = -np.cos(tilt) * normal + np.sin(tilt) * across
     if kind == "drag":
         side = round(rng.uniform(1.75, 3.5) * 4) / 4 * across
-    return Touch(site, point, normal, kind, float(depth), direction, side, repeat)
+    return PlannedTouch(site, point, normal, kind, float(depth), direction, side, repeat)

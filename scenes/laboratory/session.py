@@ -13,14 +13,14 @@ from palpate.mechanics.options import option
 from palpate.mechanics.recording.recording import Recording
 from palpate.mechanics.recording.segments import TimeSegment
 from palpate.scenes.laboratory.curves import Solving
-from palpate.scenes.laboratory.effects import Readings, effect
+from palpate.scenes.laboratory.effects import SensedSamples, effect
 from palpate.scenes.laboratory.effects.solid import scaled
 from palpate.scenes.laboratory.force import beyond_quasilinear, elastic_force
 from palpate.scenes.laboratory.frame import axes_of, quaternions, random_frame
 from palpate.scenes.laboratory.hand import HandOptions, band_noise
 from palpate.scenes.laboratory.hand_path import Motion, motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, TouchForce, touch_forces
-from palpate.scenes.laboratory.presses import PROTOCOLS, Touch
+from palpate.scenes.laboratory.presses import PROTOCOLS, PlannedTouch
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, ball
 from palpate.scenes.laboratory.tracing import RATE_HZ, trace
 from palpate.scenes.phantoms import Phantom
@@ -62,10 +62,10 @@ class Staging:
     """
 
     hand: HandOptions = HandOptions()
-    touches: tuple[Touch, ...] | None = None
+    touches: tuple[PlannedTouch, ...] | None = None
     complete: bool = False
     frame: tuple[np.ndarray, np.ndarray] | None = None
-    instrument: Callable[[Readings], Readings] | None = None
+    instrument: Callable[[SensedSamples], SensedSamples] | None = None
 
 
 class Session:
@@ -76,7 +76,7 @@ class Session:
         phantom: Phantom,
         modulus: float,
         options: SimulateOptions,
-        touches: tuple[Touch, ...],
+        touches: tuple[PlannedTouch, ...],
         parameters: Mapping[str, Mapping[str, Any]],
         seed: int,
         staging: Staging,
@@ -131,7 +131,7 @@ class Session:
 
     def run(
         self, present: Sequence[str], regions: bool = True, moved: np.ndarray | None = None
-    ) -> tuple[Readings, np.ndarray]:
+    ) -> tuple[SensedSamples, np.ndarray]:
         """(readings, their force without noise), device frame, SI, with the effects `present`.
 
         moved: (n, 3) mm, object frame: the tip goes this much aside of the hand's way.
@@ -152,7 +152,7 @@ class Session:
             if name == "viscoelasticity" and self.options.relaxation == "solid":
                 force = force + self._beyond_quasilinear(present, regions, way, normals)
         turn = self.rotation
-        readings = Readings(
+        readings = SensedSamples(
             way.t,
             1e-3 * (way.position @ turn.T) + self.shift,
             (force + way.trace_force) @ turn.T,
@@ -200,7 +200,7 @@ class Session:
         normals[inside] = np.array([t.normal for t in self.touches])[way.touch[inside]]
         return normals
 
-    def recording(self, readings: Readings, clean: np.ndarray, truth: Mapping[str, Any]) -> Recording:
+    def recording(self, readings: SensedSamples, clean: np.ndarray, truth: Mapping[str, Any]) -> Recording:
         """Noise added, positions quantised."""
         options, rng = self.options, self._rng("noise")
         n = len(readings.t)
@@ -226,7 +226,7 @@ class Session:
         )
 
 
-def _aside(way: Motion, moved: np.ndarray, touches: Sequence[Touch]) -> Motion:
+def _aside(way: Motion, moved: np.ndarray, touches: Sequence[PlannedTouch]) -> Motion:
     """The way of a tip that is displaced by `moved` (n, 3) mm: along each touch's path, and
     sideways of it.
     """

@@ -14,9 +14,9 @@ from palpate.mechanics.errors import OptionError
 from palpate.mechanics.recording.recording import Recording, read_recording, write_recording
 from palpate.mechanics.result import Result
 from palpate.scenes.laboratory.curves import EVERY_CORE, Solving
-from palpate.scenes.laboratory.effects import REGISTRY, Bench, Readings, effect
+from palpate.scenes.laboratory.effects import REGISTRY, EffectContext, SensedSamples, effect
 from palpate.scenes.laboratory.hand_path import Motion
-from palpate.scenes.laboratory.presses import Touch, press_set
+from palpate.scenes.laboratory.presses import PlannedTouch, press_set
 from palpate.scenes.laboratory.session import Session, SimulateOptions, Staging
 from palpate.scenes.laboratory.truth import truth_of
 from palpate.scenes.phantoms import Phantom
@@ -35,9 +35,9 @@ class Simulation(Result):
     recording: Recording
     truth: Mapping[str, Any]
     clean_n: np.ndarray
-    touches: tuple[Touch, ...]
+    touches: tuple[PlannedTouch, ...]
     motion: Motion
-    readings: Readings
+    readings: SensedSamples
     ideal_n: np.ndarray | None = None
     body: Phantom | None = None
 
@@ -99,11 +99,11 @@ def _parameters(
     strengths: Mapping[str, float],
     modulus: float,
     options: SimulateOptions,
-    touches: Sequence[Touch],
+    touches: Sequence[PlannedTouch],
 ) -> dict[str, dict[str, Any]]:
     out = {}
     for name in sorted(strengths, key=list(REGISTRY).index):
         rng = np.random.default_rng([options.presses, zlib.crc32(name.encode())])
-        bench = Bench(phantom, modulus, options.tip_radius_m, tuple(touches), rng)
+        bench = EffectContext(phantom, modulus, options.tip_radius_m, tuple(touches), rng)
         out[name] = effect(name).parameters(strengths[name], bench)
     return out

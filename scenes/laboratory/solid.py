@@ -17,7 +17,7 @@ from palpate.scenes.laboratory.mesh import GAUSS, QuadraticMesh, shape_gradients
 _UNIT_GRADIENTS = np.array([shape_gradients(*b) for b in GAUSS])
 
 
-class Material:
+class SolidMaterial:
     """Per Gauss point of a mesh (m elements, 4 points): what the solid is made of.
 
     shear, bulk: (m, 4), (m,) units of E. stiffening: c20 / c10 at small strains (laws.isochoric). fibre:
@@ -65,7 +65,7 @@ class History:
 class Solid:
     """Residual, tangent and energy of a mesh with a material."""
 
-    def __init__(self, mesh: QuadraticMesh, material: Material) -> None:
+    def __init__(self, mesh: QuadraticMesh, material: SolidMaterial) -> None:
         self.mesh, self.material = mesh, material
         jacobian = np.einsum("gax,eay->egxy", _UNIT_GRADIENTS, mesh.points[mesh.cells])
         self.weights = np.linalg.det(jacobian) / 24

@@ -15,7 +15,7 @@ import numpy as np
 
 from palpate.mechanics.elastic.partial_factor import partial_factor
 from palpate.mechanics.errors import PalpateError
-from palpate.scenes.laboratory.contact import Grip, SphereContact
+from palpate.scenes.laboratory.contact import Anchors, SphereContact
 from palpate.scenes.laboratory.solid import History, Solid
 from palpate.scenes.laboratory.touching import Assembly, Touching
 
@@ -49,7 +49,7 @@ class Mixing:
 
 
 @dataclass(frozen=True)
-class State:
+class SolvedState:
     """A converged equilibrium: displacement (n, 3) mm, force on the tip (3,), the tip's centre (3,) mm."""
 
     displacement: np.ndarray
@@ -57,7 +57,7 @@ class State:
     force: np.ndarray
     energy: float
     history: History
-    grip: Grip
+    grip: Anchors
 
 
 class Driven(ABC):
@@ -131,15 +131,15 @@ class Problem(Driven):
         self._compliance: np.ndarray | None = None
         self._kept = np.flatnonzero(self.free)[self._touching.kept]
 
-    def rest(self, centre: np.ndarray) -> State:
+    def rest(self, centre: np.ndarray) -> SolvedState:
         self._compliance = None
         u = np.zeros_like(self.solid.mesh.points)
         grip = self._touching.contact.start(centre)
-        return State(u, np.asarray(centre, float), np.zeros(3), 0.0, self.solid.new_history(), grip)
+        return SolvedState(u, np.asarray(centre, float), np.zeros(3), 0.0, self.solid.new_history(), grip)
 
-    def _pressed_anew(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
+    def _pressed_anew(self, state: SolvedState, centre: np.ndarray, step_s: float) -> SolvedState | None:
         away = self._touching.contact.clear_of(centre, state.grip)
-        found: State | None = replace(self.rest(away), history=state.history)
+        found: SolvedState | None = replace(self.rest(away), history=state.history)
         for share in np.linspace(0, 1, 1 + int(np.ceil(np.linalg.norm(away - centre) / 0.5))):
             found = found and self._step(found, away + share * (centre - away), step_s)
             step_s = 0.0
@@ -155,7 +155,7 @@ class Problem(Driven):
         self._compliance = np.linalg.inv(self._factor.refresh(self._assembly.stiffness(elements)))
         return self._compliance
 
-    def _step(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
+    def _step(self, state: SolvedState, centre: np.ndarray, step_s: float) -> SolvedState | None:
         held, u, kept = state.grip.copy(), state.displacement, self._touching.kept
         known, mixing = self._compliance, Mixing()
         elements, _, energy, history = self.solid.evaluate(u, state.history, step_s, False)
@@ -180,7 +180,7 @@ class Problem(Driven):
             r[kept] += now.load
             norm, scale = float(np.linalg.norm(r)), max(now.scale, 1e-3)
             if near and norm < self.tolerance * scale:
-                return State(u, centre.copy(), now.force, energy, history, now.grip)
+                return SolvedState(u, centre.copy(), now.force, energy, history, now.grip)
             near = norm < 0.02 * scale
             last, before = norm, np.inf if anew else last
             if not np.array_equal(held.active, active):
@@ -203,7 +203,7 @@ class Problem(Driven):
             u, (elements, _, energy, history) = u + cut * step, found
         return None
 
-    def tip_stiffness(self, state: State) -> np.ndarray:
+    def tip_stiffness(self, state: SolvedState) -> np.ndarray:
         """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative.
 
         With the tangent that the last load step took on its way: within some 1 % of the one at its end,

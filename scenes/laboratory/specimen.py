@@ -18,9 +18,9 @@ from palpate.scenes.laboratory.contact import SphereContact
 from palpate.scenes.laboratory.field import Field, ratio_at
 from palpate.scenes.laboratory.linear import LinearProblem
 from palpate.scenes.laboratory.mesh import QuadraticMesh, graded_mesh
-from palpate.scenes.laboratory.solid import Material, Solid
+from palpate.scenes.laboratory.solid import Solid, SolidMaterial
 from palpate.scenes.laboratory.solver import Driven, Problem
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom
 
 VERSION = 7
@@ -118,7 +118,7 @@ def build(
         balls=balls,
         cache=cache,
     )
-    material = Material(len(mesh.cells), specimen.poisson_ratio)
+    material = SolidMaterial(len(mesh.cells), specimen.poisson_ratio)
     solid = Solid(mesh, material)
     _place(solid, specimen, phantom)
     near = (
@@ -141,9 +141,9 @@ def _place(solid: Solid, specimen: Specimen, phantom: Phantom) -> None:
         ratio *= base + (top - base) * np.clip(at[..., 2] / (1e3 * phantom.height_m), 0, 1)
     if specimen.skin is not None:
         thickness, stiffer = specimen.skin
-        surface = Surface(phantom.vertices * 1e3, phantom.faces)
+        surface = TriangleSurface(phantom.vertices * 1e3, phantom.faces)
         off_base = surface.corners[..., 2].max(axis=1) > 1e-6
-        bare = Surface(surface.vertices, surface.faces[off_base])
+        bare = TriangleSurface(surface.vertices, surface.faces[off_base])
         depth = bare.nearest(at.reshape(-1, 3))[1].reshape(at.shape[:2])
         # an element larger than the skin takes the share of it that the skin fills
         size = np.cbrt(solid.weights.sum(axis=1))[:, None]

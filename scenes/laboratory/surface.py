@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 
-class Surface:
+class TriangleSurface:
     """A triangle surface that answers nearest-point questions; lengths in the caller's unit.
 
     vertices: (n, 3); faces: (m, 3), counter-clockwise from outside, edges short against the shape.

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from palpate.scenes.laboratory.contact import Grip, SphereContact
+from palpate.scenes.laboratory.contact import Anchors, SphereContact
 
 
 class Assembly:
@@ -63,7 +63,7 @@ class Pressed:
     load: np.ndarray
     force: np.ndarray
     scale: float
-    grip: Grip
+    grip: Anchors
 
 
 class Touching:
@@ -97,7 +97,7 @@ class Touching:
         self._floor = np.zeros(self._size) if floor is None else floor[stays]
 
     def evaluate(
-        self, u: np.ndarray, centre: np.ndarray, held: Grip, arrivals: bool = True
+        self, u: np.ndarray, centre: np.ndarray, held: Anchors, arrivals: bool = True
     ) -> tuple[Pressed, np.ndarray]:
         """(load and contact at displacement u (m,), stiffness of every face (k, 18, 18))."""
         forces, face_k, force, grip = self.contact.evaluate(self._of_nodes(u), centre, held, True, arrivals)
@@ -105,7 +105,7 @@ class Touching:
         load += self._floor * np.minimum(u, 0.0)
         return Pressed(u, load, force, float(np.abs(forces).sum()), grip), face_k
 
-    def expect(self, u: np.ndarray, centre: np.ndarray, held: Grip) -> None:
+    def expect(self, u: np.ndarray, centre: np.ndarray, held: Anchors) -> None:
         """Arrivals that displacement u (m,) brings to the sphere, see SphereContact."""
         self.contact.expect(self._of_nodes(u), centre, held)
 
@@ -113,8 +113,8 @@ class Touching:
         return u[self._on_faces].reshape(-1, 3)
 
     def settle(
-        self, compliance: np.ndarray, free_motion: np.ndarray, u: np.ndarray, centre: np.ndarray, held: Grip,
-        *, predict: bool = True, release: bool = True,
+        self, compliance: np.ndarray, free_motion: np.ndarray, u: np.ndarray, centre: np.ndarray,
+        held: Anchors, *, predict: bool = True, release: bool = True,
     ) -> Pressed | None:  # fmt: skip
         """Newton's method for u = w - C f(u) with C (m, m) and w (m,), from u; None where it does not settle.
 
@@ -169,7 +169,7 @@ class Touching:
         return on, matrix
 
     def tip_stiffness(
-        self, compliance: np.ndarray, u: np.ndarray, centre: np.ndarray, grip: Grip
+        self, compliance: np.ndarray, u: np.ndarray, centre: np.ndarray, grip: Anchors
     ) -> np.ndarray:
         """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative."""
         _, face_k = self.evaluate(u, centre, grip)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom
 
 RATE_HZ = 1000.0
@@ -24,7 +24,7 @@ class Trace:
     contact: np.ndarray
 
 
-def foot_path(surface: Surface, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def foot_path(surface: TriangleSurface, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(positions (k, 3), outward horizontal directions (k, 3), arc length (k,)) once around the foot.
 
     The tip's centre runs at the height of its radius and touches the wall.
@@ -46,7 +46,7 @@ def foot_path(surface: Surface, radius: float) -> tuple[np.ndarray, np.ndarray, 
     return centres, outward, np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(loop, axis=0), axis=1))])
 
 
-def _outline(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+def _outline(surface: TriangleSurface) -> tuple[np.ndarray, np.ndarray]:
     """The base's rim as an ordered loop, and outward horizontal unit normals, smoothed."""
     flat = surface.corners[..., 2].max(axis=1) < 1e-6
     edges = np.sort(surface.faces[flat][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -97,7 +97,7 @@ def trace(
     key = (phantom.vertices.tobytes(), phantom.faces.tobytes(), radius)
     if key not in _last_foot:
         _last_foot.clear()
-        _last_foot[key] = foot_path(Surface(phantom.vertices * 1e3, phantom.faces), radius)
+        _last_foot[key] = foot_path(TriangleSurface(phantom.vertices * 1e3, phantom.faces), radius)
     path, outward, arc = _last_foot[key]
     total = arc[-1]
     turns = hand.trace_rounds + rng.uniform(0.08, 0.22)

@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.mechanics.presses.gap_bins import gap_by_bin
 from palpate.mechanics.presses.table import HOLDING, LOADING, OUTSIDE, UNLOADING
-from palpate.scenes.laboratory.effects import Readings, effect
+from palpate.scenes.laboratory.effects import SensedSamples, effect
 from palpate.scenes.laboratory.force import elastic_force
 from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_OUT
@@ -24,7 +24,7 @@ def truth_of(
     session: Session,
     present: Sequence[str],
     clean: np.ndarray,
-    whole: Readings,
+    whole: SensedSamples,
     sizes: bool,
     strengths: Mapping[str, float],
 ) -> dict[str, Any]:
@@ -78,7 +78,7 @@ def truth_of(
     return truth
 
 
-def _answered(session: Session, rest: Sequence[str], whole: Readings, *, regions: bool) -> np.ndarray:
+def _answered(session: Session, rest: Sequence[str], whole: SensedSamples, *, regions: bool) -> np.ndarray:
     """(n, 3) N, device frame: the force with the effects `rest` alone, where the instrument says that the tip
     is."""
     readings, force = session.run(rest, regions=regions)
@@ -89,7 +89,7 @@ def _answered(session: Session, rest: Sequence[str], whole: Readings, *, regions
 
 
 def _where(
-    session: Session, present: Sequence[str], clean: np.ndarray, whole: Readings, way: Motion
+    session: Session, present: Sequence[str], clean: np.ndarray, whole: SensedSamples, way: Motion
 ) -> dict[str, Any]:
     """N rms of the gap in bins (mechanics.presses.gap_bins) and, beside `press_n`, when each touch was:
     `press_s`, (first, last) s of the laboratory's clock.
@@ -114,7 +114,7 @@ def _where(
     return {"press_s": spans, **gap_by_bin(square, touch, len(session.touches), depth, phase, t)}
 
 
-def _reads_in_air(whole: Readings, name: str, session: Session) -> bool:
+def _reads_in_air(whole: SensedSamples, name: str, session: Session) -> bool:
     """Whether the instrument reads a force of this effect where nothing is touched."""
     read = effect(name).on_readings
     untouched = replace(whole, force=np.zeros_like(whole.force))

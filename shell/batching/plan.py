@@ -41,7 +41,7 @@ class FoundRecordings:
 
 
 @dataclass(frozen=True)
-class Choice:
+class BatchChoice:
     """What is to be done with every recording. steps: of STEPS, in order; options: step -> keywords of the
     operation; reports: HTML pages too."""
 
@@ -175,7 +175,7 @@ def content_of(recording: str | Path, shape: str = "") -> dict[str, str]:
         return {name: sha256_of_file(path) for name, path in files.items() if path.is_file()}
 
 
-def tasks_of(found: FoundRecordings, choice: Choice, out: Path) -> list[Task]:
+def tasks_of(found: FoundRecordings, choice: BatchChoice, out: Path) -> list[Task]:
     """The recording's tasks, in order; raises RecordingError where its files cannot be read."""
     options = {step: choice.of(step) for step in choice.steps}
     shape = options["reconstruct"].pop("shape", "")  # a place: what counts is what the file holds
@@ -217,7 +217,7 @@ _TRACE = Kind("a trace", (b"Traceback",))
 def batch(
     sources: Iterable[str | Path],
     out: str | Path,
-    choice: Choice,
+    choice: BatchChoice,
     *,
     workers: int | None = None,
     scheduler: str | None = None,

@@ -67,14 +67,14 @@ def batch(
     bytes, options and version, unless force. One bad recording stops no other: its row has the reason.
     Raises OptionError.
     """
-    from palpate.batching.plan import Choice
+    from palpate.batching.plan import BatchChoice
     from palpate.batching.plan import batch as run
 
     steps = tuple(do.split(",")) if isinstance(do, str) else tuple(do)
     result = run(
         [recordings] if isinstance(recordings, str | Path) else recordings,
         out,
-        Choice(steps, options_of(options), seed, reports),
+        BatchChoice(steps, options_of(options), seed, reports),
         workers=workers,
         memory_bytes=None if memory_gb is None else int(1e9 * memory_gb),
         scheduler=scheduler,

@@ -18,7 +18,7 @@ from benchmarks.varied.writing import write
 from benchmarks.variety import REMEDIES
 from palpate import reconstruction
 from palpate.mechanics.recording.recording import read_recording
-from palpate.scenes.laboratory.effects import Readings
+from palpate.scenes.laboratory.effects import SensedSamples
 from palpate.scenes.laboratory.frame import axes_of
 
 
@@ -104,7 +104,7 @@ def _swung(seconds=3.0):
     t = np.arange(int(1000 * seconds)) / 1000
     position = np.column_stack([0.03 * np.sin(2 * np.pi * t), 0 * t, 0.1 + 0 * t])
     axes = axes_of(np.repeat([[0.0, 0.0, 1.0]], len(t), axis=0))
-    return Readings(t, position, np.zeros((len(t), 3)), axes, np.ones(len(t), dtype=bool))
+    return SensedSamples(t, position, np.zeros((len(t), 3)), axes, np.ones(len(t), dtype=bool))
 
 
 def test_weight_and_inertia_are_the_tools():

@@ -7,7 +7,7 @@ import numpy as np
 from palpate.scenes.laboratory.contact import SphereContact
 from palpate.scenes.laboratory.linear import LinearProblem
 from palpate.scenes.laboratory.mesh import QuadraticMesh, quadratic, refine
-from palpate.scenes.laboratory.solid import Material, Solid
+from palpate.scenes.laboratory.solid import Solid, SolidMaterial
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
 from palpate.scenes.phantoms import Phantom
 
@@ -31,7 +31,7 @@ def box(length: float, height: float, finest: float, growth: float) -> Quadratic
 def patch_test(poisson_ratio: float = 0.49) -> float:
     """Greatest residual over greatest internal force of inner nodes under a uniform finite deformation."""
     mesh = box(20.0, 12.0, 4.0, 0.5)
-    solid = Solid(mesh, Material(len(mesh.cells), poisson_ratio))
+    solid = Solid(mesh, SolidMaterial(len(mesh.cells), poisson_ratio))
     stretch = np.array([[0.12, 0.05, -0.03], [0.02, -0.06, 0.04], [0.01, 0.03, -0.04]])
     force, _, _, _ = solid.evaluate(mesh.points @ stretch.T, solid.new_history(), 0.0, False)
     total = np.zeros_like(mesh.points)
@@ -41,7 +41,7 @@ def patch_test(poisson_ratio: float = 0.49) -> float:
     return float(np.abs(total[~shell]).max() / np.abs(force).max())
 
 
-def tangent_error(material: Material, solid: Solid, seed: int = 0) -> float:
+def tangent_error(material: SolidMaterial, solid: Solid, seed: int = 0) -> float:
     """Largest relative difference of the element tangents from central differences of the element forces."""
     rng = np.random.default_rng(seed)
     points = solid.mesh.points
@@ -64,7 +64,7 @@ def hertz_ratio(depth: float = 0.5, radius: float = 50.0, finest: float = 0.5) -
     contact_radius = np.sqrt(radius * depth)
     length, height = 300 * contact_radius, 150 * contact_radius
     mesh = box(length, height, finest * contact_radius, 0.45)
-    solid = Solid(mesh, Material(len(mesh.cells), poisson))
+    solid = Solid(mesh, SolidMaterial(len(mesh.cells), poisson))
     top = np.array([0.0, 0.0, height])
     near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - top, axis=1) < 3 * contact_radius
     contact = SphereContact(mesh.points, mesh.faces[near], radius, 0.0)
@@ -86,7 +86,9 @@ def dent_force(depths: np.ndarray, radius: float = 5.0, finest: float = 3.0, ste
     top = np.array([0.0, 0.0, 40 * radius])
     near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - top, axis=1) < 2.4 * radius
     contact = SphereContact(mesh.points, mesh.faces[near], radius, None)
-    problem = LinearProblem(Solid(mesh, Material(len(mesh.cells), 0.49)), contact, ~np.repeat(mesh.fixed, 3))
+    problem = LinearProblem(
+        Solid(mesh, SolidMaterial(len(mesh.cells), 0.49)), contact, ~np.repeat(mesh.fixed, 3)
+    )
     start = top + [0.0, 0.0, radius]
     state, force, before = problem.rest(start + [0.0, 0.0, 1e-3]), [], 0.0
     for depth in depths:

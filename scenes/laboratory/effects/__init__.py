@@ -5,9 +5,9 @@ from __future__ import annotations
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import unknown
 from palpate.scenes.laboratory.effects import contact, instrument, solid, stiffness_field
-from palpate.scenes.laboratory.effects.base import Bench, Effect, Readings
+from palpate.scenes.laboratory.effects.base import EffectContext, SensedSamples, SimulatedEffect
 
-REGISTRY: dict[str, Effect] = {
+REGISTRY: dict[str, SimulatedEffect] = {
     effect.name: effect
     for effect in (
         *solid.EFFECTS,
@@ -20,11 +20,11 @@ REGISTRY: dict[str, Effect] = {
 """Effects by name; the order is the order in which they act."""
 
 
-def effect(name: str) -> Effect:
+def effect(name: str) -> SimulatedEffect:
     """The effect of that name; raises OptionError with the allowed names."""
     if name not in REGISTRY:
         raise OptionError(unknown(name, "effect", REGISTRY))
     return REGISTRY[name]
 
 
-__all__ = ["REGISTRY", "Bench", "Effect", "Readings", "effect"]
+__all__ = ["REGISTRY", "EffectContext", "SimulatedEffect", "SensedSamples", "effect"]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from palpate.scenes.laboratory.hand_path import Motion
-from palpate.scenes.laboratory.presses import Touch
+from palpate.scenes.laboratory.presses import PlannedTouch
 from palpate.scenes.laboratory.specimen import Specimen
 from palpate.scenes.phantoms import Phantom
 
@@ -17,7 +17,7 @@ Parameters = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Bench:
+class EffectContext:
     """What an effect may look at to choose its parameters: the ideal object, the touches, and
     its own chance.
     """
@@ -25,12 +25,12 @@ class Bench:
     phantom: Phantom
     modulus_pa: float
     tip_radius_m: float
-    touches: tuple[Touch, ...]
+    touches: tuple[PlannedTouch, ...]
     rng: np.random.Generator
 
 
 @dataclass(frozen=True)
-class Readings:
+class SensedSamples:
     """Samples as instruments see them, device frame, SI: t (n,), position (n, 3), force on the tool (n, 3),
     axes (n, 3, 3): tool frame to device frame. second: (n,) bool, phase II.
     """
@@ -43,7 +43,7 @@ class Readings:
 
 
 @dataclass(frozen=True)
-class Effect:
+class SimulatedEffect:
     """One departure from the ideal model.
 
     parameters(strength, bench): the keys of the contract, SI. in_solid(specimen, parameters): solved in
@@ -56,10 +56,10 @@ class Effect:
 
     name: str
     domain: str
-    parameters: Callable[[float, Bench], dict[str, Any]]
+    parameters: Callable[[float, EffectContext], dict[str, Any]]
     in_solid: Callable[[Specimen, Parameters], Specimen] | None = None
     on_force: Callable[[np.ndarray, Motion, np.ndarray, Parameters], np.ndarray] | None = None
-    on_readings: Callable[[Readings, Parameters], Readings] | None = None
+    on_readings: Callable[[SensedSamples, Parameters], SensedSamples] | None = None
     on_shape: Callable[[Phantom, Parameters], Phantom] | None = None
     needs_finite: bool = False
     least_strength: float = 0.0

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import fftconvolve
 
-from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters
+from palpate.scenes.laboratory.effects.base import EffectContext, Parameters, SimulatedEffect
 from palpate.scenes.laboratory.hand_path import Motion
 from palpate.scenes.laboratory.paths import SIDEWAYS, WAY_OUT
 from palpate.scenes.laboratory.tracing import RATE_HZ
@@ -148,7 +148,7 @@ _RANGES = (2e-4, 0.4)
 towards that of Derjaguin, Muller & Toporov."""
 
 
-def _sticking(strength: float, bench: Bench) -> dict[str, Any]:
+def _sticking(strength: float, bench: EffectContext) -> dict[str, Any]:
     plane_strain = bench.modulus_pa / (1 - 0.49**2)
     reach = float(np.exp(bench.rng.uniform(*np.log(_RANGES))))
     return {
@@ -192,7 +192,7 @@ def _poroelastic(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Para
     return let_go(out, force, motion, normals)
 
 
-def _seeping(strength: float, bench: Bench) -> dict[str, Any]:
+def _seeping(strength: float, bench: EffectContext) -> dict[str, Any]:
     return {
         "share": 0.35 * strength,
         "diffusivity_m2_per_s": 3e-5,
@@ -200,7 +200,7 @@ def _seeping(strength: float, bench: Bench) -> dict[str, Any]:
     }
 
 
-def _fibres(strength: float, bench: Bench) -> dict[str, Any]:
+def _fibres(strength: float, bench: EffectContext) -> dict[str, Any]:
     angle = float(np.round(bench.rng.uniform(0, np.pi), 3))
     return {
         "fibre_over_shear": 2.0 * strength,
@@ -209,53 +209,53 @@ def _fibres(strength: float, bench: Bench) -> dict[str, Any]:
 
 
 EFFECTS = (
-    Effect(
+    SimulatedEffect(
         "viscoelasticity",
         "object",
         lambda strength, bench: {"g": [0.3 * strength], "tau_s": [0.3]},
         on_force=_viscoelastic,
         forgets=True,
     ),
-    Effect(
+    SimulatedEffect(
         "power_law_relaxation",
         "object",
         lambda strength, bench: {"share": 0.15 * strength, "exponent": 0.3},
         on_force=_power_law,
         forgets=True,
     ),
-    Effect("poroelasticity", "object", _seeping, on_force=_poroelastic, forgets=True),
-    Effect(
+    SimulatedEffect("poroelasticity", "object", _seeping, on_force=_poroelastic, forgets=True),
+    SimulatedEffect(
         "tip_radius",
         "contact",
         lambda strength, bench: {"tip_radius_m": bench.tip_radius_m * (1 + 0.3 * strength)},
         lambda s, p: replace(s, tip_radius=1e3 * p["tip_radius_m"]),
     ),
-    Effect(
+    SimulatedEffect(
         "friction_slip",
         "contact",
         lambda strength, bench: {"mu": 0.1 / strength},
         lambda s, p: replace(s, friction=p["mu"]),
     ),
-    Effect(
+    SimulatedEffect(
         "adhesion",
         "contact",
         lambda strength, bench: {"pull_off_n": 0.1 * strength, "range_m": 0.0006},
         on_force=_adhere,
         forgets=True,
     ),
-    Effect("jkr_adhesion", "contact", _sticking, on_force=_sticky, forgets=True),
+    SimulatedEffect("jkr_adhesion", "contact", _sticking, on_force=_sticky, forgets=True),
 )
 """Effects of contact and of relaxation."""
 
 UNNAMED = (
-    Effect(
+    SimulatedEffect(
         "plasticity",
         "object",
         lambda strength, bench: {"share": 0.8 * strength, "yield_over_shear": 0.12},
         lambda s, p: replace(s, plastic=(p["share"], p["yield_over_shear"])),
         needs_finite=True,
     ),
-    Effect(
+    SimulatedEffect(
         "anisotropy",
         "object",
         _fibres,

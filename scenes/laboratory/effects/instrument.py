@@ -8,7 +8,13 @@ from typing import Any
 import numba
 import numpy as np
 
-from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters, Readings, unit
+from palpate.scenes.laboratory.effects.base import (
+    EffectContext,
+    Parameters,
+    SensedSamples,
+    SimulatedEffect,
+    unit,
+)
 from palpate.scenes.laboratory.tracing import RATE_HZ
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -25,14 +31,14 @@ def _rotation(vector: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
 
 
-def _offset_parameters(strength: float, bench: Bench) -> dict[str, Any]:
+def _offset_parameters(strength: float, bench: EffectContext) -> dict[str, Any]:
     return {
         "shift_m": (1.5e-3 * strength * unit(bench.rng)).round(7).tolist(),
         "rotation_rad": (np.radians(1.5) * strength * unit(bench.rng)).round(7).tolist(),
     }
 
 
-def _displace(readings: Readings, p: Parameters) -> Readings:
+def _displace(readings: SensedSamples, p: Parameters) -> SensedSamples:
     """Phase II is read in a frame that moved against phase I's, about the device's origin."""
     turn = _rotation(np.array(p["rotation_rad"]))
     pivot = readings.position[readings.second].mean(axis=0)
@@ -45,13 +51,13 @@ def _displace(readings: Readings, p: Parameters) -> Readings:
     return replace(readings, position=readings.position + share * (moved - readings.position), force=force)
 
 
-def _gain(strength: float, bench: Bench) -> dict[str, Any]:
+def _gain(strength: float, bench: EffectContext) -> dict[str, Any]:
     cross = 0.05 * strength * bench.rng.choice([-1.0, 1.0], size=(3, 3))
     matrix = np.where(np.eye(3) > 0, 1 + 0.1 * strength, cross)
     return {"matrix": matrix.round(6).tolist()}
 
 
-def _weigh(readings: Readings, p: Parameters) -> Readings:
+def _weigh(readings: SensedSamples, p: Parameters) -> SensedSamples:
     """A mass beyond the sensor: its weight and inertia read as force on the tool; tared where the session
     began.
     """
@@ -70,7 +76,7 @@ def _smoothed(position: np.ndarray) -> np.ndarray:
     return gaussian_filter1d(position, 4.0, axis=0, mode="nearest")
 
 
-def _late(readings: Readings, p: Parameters) -> Readings:
+def _late(readings: SensedSamples, p: Parameters) -> SensedSamples:
     at = readings.t - p["delay_s"]
     force = np.column_stack([np.interp(at, readings.t, readings.force[:, k]) for k in range(3)])
     return replace(readings, force=force)
@@ -87,8 +93,8 @@ def _play(values, width):
 
 
 EFFECTS = (
-    Effect("surface_offset", "boundary", _offset_parameters, on_readings=_displace),
-    Effect(
+    SimulatedEffect("surface_offset", "boundary", _offset_parameters, on_readings=_displace),
+    SimulatedEffect(
         "tool_compliance",
         "instrument",
         lambda strength, bench: {"stiffness_n_per_m": 1200.0 / strength},
@@ -96,40 +102,40 @@ EFFECTS = (
         on_readings=lambda r, p: replace(r, position=r.position - r.force / p["stiffness_n_per_m"]),
         forgets=True,
     ),
-    Effect(
+    SimulatedEffect(
         "tool_gravity_inertia",
         "instrument",
         lambda strength, bench: {"mass_kg": 0.05 * strength, "tared": True},
         on_readings=_weigh,
     ),
-    Effect(
+    SimulatedEffect(
         "force_gain",
         "instrument",
         _gain,
         on_readings=lambda r, p: replace(r, force=r.force @ np.array(p["matrix"]).T),
         forgets=True,
     ),
-    Effect(
+    SimulatedEffect(
         "force_bias",
         "instrument",
         lambda strength, bench: {"bias_n": (0.05 * strength * unit(bench.rng)).round(6).tolist()},
         on_readings=lambda r, p: replace(r, force=r.force + p["bias_n"]),
         forgets=True,
     ),
-    Effect(
+    SimulatedEffect(
         "force_drift",
         "instrument",
         lambda strength, bench: {"rate_n_per_s": (0.001 * strength * unit(bench.rng)).round(8).tolist()},
         on_readings=lambda r, p: replace(r, force=r.force + np.outer(r.t, p["rate_n_per_s"])),
     ),
-    Effect(
+    SimulatedEffect(
         "time_delay",
         "instrument",
         lambda strength, bench: {"delay_s": 0.02 * strength},
         on_readings=_late,
         forgets=True,
     ),
-    Effect(
+    SimulatedEffect(
         "backlash",
         "instrument",
         lambda strength, bench: {"width_m": 0.25e-3 * strength},

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from palpate.mechanics.errors import OptionError
-from palpate.scenes.laboratory.effects.base import Bench, Effect, Parameters
+from palpate.scenes.laboratory.effects.base import EffectContext, Parameters, SimulatedEffect
 from palpate.scenes.laboratory.specimen import Specimen, ball
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom
 
 
-def _inclusion(strength: float, bench: Bench) -> dict[str, Any]:
+def _inclusion(strength: float, bench: EffectContext) -> dict[str, Any]:
     """Below a touched place; moved inwards until it lies inside the object."""
     radius = bench.phantom.height_m / 5
-    surface = Surface(bench.phantom.vertices * 1e3, bench.phantom.faces)
+    surface = TriangleSurface(bench.phantom.vertices * 1e3, bench.phantom.faces)
     order = bench.rng.permutation(len(bench.touches))
     best, most = np.zeros(3), -np.inf
     for k in order:
@@ -43,13 +43,13 @@ def _with_ball(specimen: Specimen, p: Parameters) -> Specimen:
     return replace(specimen, balls=(*specimen.balls, added))
 
 
-def _base_modulus(strength: float, bench: Bench) -> dict[str, Any]:
+def _base_modulus(strength: float, bench: EffectContext) -> dict[str, Any]:
     if strength > 3.2:
         raise OptionError(f"modulus_gradient has strength {strength}; the top would vanish: at most 3.2")
     return {"ratio_base": 1 + 0.5 * strength, "ratio_top": 1 - 0.3 * strength}
 
 
-def _unbonded(strength: float, bench: Bench) -> dict[str, Any]:
+def _unbonded(strength: float, bench: EffectContext) -> dict[str, Any]:
     if not 0 < strength <= 1.5:
         raise OptionError(
             f"unbonded_base has strength {strength}; between 0 and 1.5, so that some base holds"
@@ -66,7 +66,7 @@ def _loosen(specimen: Specimen, p: Parameters) -> Specimen:
     return replace(specimen, base=("unbonded", p["bonded_fraction"], round(angle, 3)))
 
 
-def _springs(strength: float, bench: Bench) -> dict[str, Any]:
+def _springs(strength: float, bench: EffectContext) -> dict[str, Any]:
     stiffness = bench.modulus_pa / bench.phantom.height_m / strength
     return {"k_normal_pa_per_m": stiffness, "k_tangential_pa_per_m": stiffness / 3}
 
@@ -78,9 +78,9 @@ def scaled(name: str, parameters: Parameters, modulus_pa: float) -> dict[str, An
     return {key: round(value / modulus_pa / 1e3, 9) for key, value in parameters.items()}
 
 
-def _shape(strength: float, bench: Bench) -> dict[str, Any]:
+def _shape(strength: float, bench: EffectContext) -> dict[str, Any]:
     """A bite out of the place that is farthest from all touches."""
-    surface = Surface(bench.phantom.vertices * 1e3, bench.phantom.faces)
+    surface = TriangleSurface(bench.phantom.vertices * 1e3, bench.phantom.faces)
     points = np.array([t.point for t in bench.touches])
     free = surface.vertices[surface.vertices[:, 2] > 8.0]
     gap = np.linalg.norm(free[:, None] - points[None], axis=2).min(axis=1)
@@ -110,8 +110,10 @@ def _bite(phantom: Phantom, p: Parameters) -> Phantom:
 
 
 EFFECTS = (
-    Effect("finite_strain", "object", lambda strength, bench: {}, lambda s, p: replace(s, finite=True)),
-    Effect(
+    SimulatedEffect(
+        "finite_strain", "object", lambda strength, bench: {}, lambda s, p: replace(s, finite=True)
+    ),
+    SimulatedEffect(
         "strain_stiffening",
         "object",
         lambda strength, bench: {"c20_over_c10": 0.35 * strength},
@@ -119,35 +121,35 @@ EFFECTS = (
         needs_finite=True,
         least_strength=-1.4,
     ),
-    Effect(
+    SimulatedEffect(
         "mullins_softening",
         "object",
         lambda strength, bench: {"r": 3.7 / strength, "m_rel": 1.0},
         lambda s, p: replace(s, mullins=(p["r"], p["m_rel"])),
         needs_finite=True,
     ),
-    Effect(
+    SimulatedEffect(
         "poisson_ratio",
         "object",
         lambda strength, bench: {"poisson_ratio": max(0.0, 0.49 - 0.14 * strength)},
         lambda s, p: replace(s, poisson_ratio=p["poisson_ratio"]),
     ),
-    Effect("inclusion", "object", _inclusion, _with_ball),
-    Effect(
+    SimulatedEffect("inclusion", "object", _inclusion, _with_ball),
+    SimulatedEffect(
         "modulus_gradient",
         "object",
         _base_modulus,
         lambda s, p: replace(s, gradient=(p["ratio_base"], p["ratio_top"])),
     ),
-    Effect(
+    SimulatedEffect(
         "skin_layer",
         "object",
         lambda strength, bench: {"thickness_m": 0.003, "modulus_ratio": 1 + 2 * strength},
         lambda s, p: replace(s, skin=(1e3 * p["thickness_m"], p["modulus_ratio"])),
     ),
-    Effect("surface_shape", "object", _shape, on_shape=_bite),
-    Effect("unbonded_base", "boundary", _unbonded, _loosen),
-    Effect(
+    SimulatedEffect("surface_shape", "object", _shape, on_shape=_bite),
+    SimulatedEffect("unbonded_base", "boundary", _unbonded, _loosen),
+    SimulatedEffect(
         "compliant_base",
         "boundary",
         _springs,

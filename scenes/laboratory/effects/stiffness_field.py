@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.scenes.laboratory.effects.base import Bench, Effect
+from palpate.scenes.laboratory.effects.base import EffectContext, SimulatedEffect
 from palpate.scenes.laboratory.field import Field
 
 LOG_SD = 0.35
@@ -23,7 +23,7 @@ LAYER_MM = (3.0, 9.0)
 PASSING_MM = 1.5
 
 
-def _drawn(strength: float, bench: Bench) -> dict[str, Any]:
+def _drawn(strength: float, bench: EffectContext) -> dict[str, Any]:
     rng = bench.rng
     width = 1e3 * float(np.ptp(bench.phantom.vertices, axis=0)[:2].min())
     length = width * float(np.exp(rng.uniform(*np.log(LENGTHS))))
@@ -51,4 +51,4 @@ def field_of(keys: Mapping[str, Any]) -> Field:
     return waves, layers, PASSING_MM
 
 
-EFFECTS = (Effect("stiffness_field", "object", _drawn, lambda s, p: replace(s, field=field_of(p))),)
+EFFECTS = (SimulatedEffect("stiffness_field", "object", _drawn, lambda s, p: replace(s, field=field_of(p))),)

@@ -254,16 +254,16 @@ def test_a_robot_in_the_laboratory_presses_as_fast_and_as_long_as_it_is_told():
     from palpate.scenes.laboratory.hand import HandOptions
     from palpate.scenes.laboratory.hand_path import _one_touch
     from palpate.scenes.laboratory.paths import WAY_IN
-    from palpate.scenes.laboratory.presses import Touch
-    from palpate.scenes.laboratory.surface import Surface
+    from palpate.scenes.laboratory.presses import PlannedTouch
+    from palpate.scenes.laboratory.surface import TriangleSurface
     from palpate.scenes.phantoms import phantom
 
     block = phantom("block")
-    surface = Surface(1e3 * block.vertices, block.faces)
+    surface = TriangleSurface(1e3 * block.vertices, block.faces)
     top = np.array([0.0, 0.0, 1e3 * block.height_m])
 
     def made(**given):
-        touch = Touch(
+        touch = PlannedTouch(
             0, top, np.array([0.0, 0, 1]), "press", 5.0, np.array([0.0, 0, -1]), np.zeros(3), **given
         )
         return _one_touch(0, touch, surface, HandOptions(), 5.0, np.random.default_rng(3))[0]

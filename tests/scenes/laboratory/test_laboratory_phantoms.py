@@ -11,7 +11,7 @@ from palpate.mechanics.shape.flat_foot import direction
 from palpate.scenes.laboratory.hand import HandOptions
 from palpate.scenes.laboratory.mesh import graded_mesh
 from palpate.scenes.laboratory.presses import FLOOR_MM, RIM_MM, press_set
-from palpate.scenes.laboratory.surface import Surface
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.laboratory.tracing import foot_path, trace
 from palpate.scenes.phantoms import PHANTOMS, phantom
 
@@ -65,7 +65,7 @@ def test_touches_lie_on_the_surface_away_from_rims_and_floor(name: str) -> None:
     thing = phantom(name)
     touches = press_set(thing, "ordinary", 0)
     points = np.array([t.point for t in touches])
-    surface = Surface(thing.vertices * 1e3, thing.faces)
+    surface = TriangleSurface(thing.vertices * 1e3, thing.faces)
     assert surface.nearest(points)[1].max() < 0.01
     assert points[:, 2].min() > FLOOR_MM - 0.1
     again = press_set(thing, "ordinary", 0)
@@ -91,7 +91,7 @@ def test_deep_exploration_passes_ten_millimetres_at_every_place(name: str) -> No
 @pytest.mark.parametrize("name", ["cylinder", "half-sphere", "bean"])
 def test_traced_foot_keeps_the_tip_one_radius_from_the_wall(name: str) -> None:
     thing = phantom(name)
-    surface = Surface(thing.vertices * 1e3, thing.faces)
+    surface = TriangleSurface(thing.vertices * 1e3, thing.faces)
     centres, _, _ = foot_path(surface, 5.0)
     near, distance, _ = surface.nearest(centres)
     wall = near[:, 2] > 0.01

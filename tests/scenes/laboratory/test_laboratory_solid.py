@@ -13,7 +13,7 @@ from palpate.scenes.laboratory.contact import SphereContact
 from palpate.scenes.laboratory.effects.contact import relaxed
 from palpate.scenes.laboratory.linear import LinearProblem
 from palpate.scenes.laboratory.mesh import boundary_faces
-from palpate.scenes.laboratory.solid import Material, Solid
+from palpate.scenes.laboratory.solid import Solid, SolidMaterial
 from palpate.scenes.laboratory.solver import Mixing, Problem
 from palpate.scenes.laboratory.specimen import Fineness, Specimen
 from palpate.scenes.phantoms import phantom
@@ -38,7 +38,7 @@ LAWS = {
 
 def _solid(**changes: object) -> Solid:
     mesh = box(20.0, 12.0, 6.0, 0.8)
-    material = Material(len(mesh.cells), 0.49)
+    material = SolidMaterial(len(mesh.cells), 0.49)
     for name, value in changes.items():
         setattr(material, name, value)
     return Solid(mesh, material)
@@ -51,7 +51,7 @@ TOP = np.array([0.0, 0.0, 40.0])
 def _problem(friction: float | None, linear: bool, prony: tuple = ()) -> LinearProblem | Problem:
     """A box under a sphere of radius 5 mm; problems keep no state between paths."""
     mesh = box(60.0, 40.0, 3.0, 0.8)
-    solid = Solid(mesh, Material(len(mesh.cells), 0.49))
+    solid = Solid(mesh, SolidMaterial(len(mesh.cells), 0.49))
     solid.material.prony = np.array(prony).reshape(-1, 2)
     near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - TOP, axis=1) < 12.0
     contact = SphereContact(mesh.points, mesh.faces[near], 5.0, friction)
