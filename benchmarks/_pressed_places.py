@@ -27,7 +27,7 @@ from palpate.render.options import RenderOptions
 from palpate.render.registry import create
 from palpate.scenes.laboratory.mesh import laboratory_cache
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
-from palpate.scenes.laboratory.surface import Surface as Nearest
+from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom
 
 TIP_M, MODULUS_PA, NU = 0.005, 20e3, 0.49
@@ -109,7 +109,7 @@ def in_laboratory(
     """(d,) m^2 by the laboratory's whole body (finite strain; friction None sticks); NaN from the depth on
     where it finds no equilibrium."""
     thing = Phantom(shape.name, shape.name, shape.vertices, shape.triangles, 1.0, poisson_ratio)
-    at = Nearest(1e3 * shape.vertices, shape.triangles).nearest(1e3 * point)[0][0]
+    at = TriangleSurface(1e3 * shape.vertices, shape.triangles).nearest(1e3 * point)[0][0]
     radius, force = 1e3 * TIP_M, np.full(len(depths_m), np.nan)
     specimen = Specimen(poisson_ratio, radius, finite=True, friction=friction)
     problem = build(thing, specimen, at, travel=0.0, fineness=fineness)
