@@ -13,8 +13,7 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.errors import SurfaceError
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import distance
-from palpate.reconstruction.shapes.cap import Cap, Dome
-from palpate.reconstruction.shapes.cushion import Cushion
+from palpate.reconstruction.shapes.cap import Cap, Cushion, Dome
 from palpate.reconstruction.shapes.drawing import draw
 from palpate.reconstruction.shapes.fit import Evidence, ShapeEvidence, fit
 from palpate.reconstruction.shapes.kriging import Explained, explain
