@@ -20,8 +20,7 @@ from scipy.spatial.transform import Rotation
 from palpate.importing.clocks import PARTS, POINTS_HZ, Stream, one_clock, slower_readings, stream_of
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import MOST_ODDS, Unclear, best, force_sense, press_scores
-from palpate.importing.tables import Table
-from palpate.importing.units import SI
+from palpate.importing.tables import SI, Table
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import COLUMN, EXPLORATION
 from palpate.mechanics.recording.recording import Recording

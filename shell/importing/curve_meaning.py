@@ -17,7 +17,7 @@ from palpate.importing.meaning import (
     best,
     press_scores,
 )
-from palpate.importing.units import SI, without_unit
+from palpate.importing.tables import SI, without_unit
 from palpate.importing.vocabulary import vocabulary
 from palpate.mechanics.errors import ContactError, RecordingError
 from palpate.mechanics.plausible import CURVE, UNIT_SHARES

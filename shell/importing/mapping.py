@@ -25,8 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from palpate.importing.tables import Table
-from palpate.importing.units import SI, plain, unit_in, unit_since_1970, without_unit
+from palpate.importing.tables import SI, Table, plain, unit_in, unit_since_1970, without_unit
 from palpate.importing.vocabulary import says, vocabulary
 from palpate.mechanics.disk.reading import read_toml
 from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
