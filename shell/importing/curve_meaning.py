@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from palpate.diagnosis.specimen.bench import MachineCycle
-from palpate.importing.mapping import Column
+from palpate.importing.mapping import Column, vocabulary
 from palpate.importing.meaning import (
     BestReading,
     Unclear,
@@ -18,7 +18,6 @@ from palpate.importing.meaning import (
     press_scores,
 )
 from palpate.importing.tables import SI, without_unit
-from palpate.importing.vocabulary import vocabulary
 from palpate.mechanics.errors import ContactError, RecordingError
 from palpate.mechanics.plausible import CURVE, UNIT_SHARES
 
