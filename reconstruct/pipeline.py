@@ -56,8 +56,7 @@ from palpate.reconstruction.steps.s4_surface import (
     reconstruct_surface,
     shape_table,
 )
-from palpate.reconstruction.steps.s5_mesh.background import BackgroundMesher
-from palpate.reconstruction.steps.s5_mesh.meshing import Meshing, uncertainty_at
+from palpate.reconstruction.steps.s5_mesh.meshing import BackgroundMesher, Meshing, uncertainty_at
 from palpate.reconstruction.steps.s6_one_d import OneD, columns, profiles
 from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors, held_out, modulus_by_others
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
-from palpate.diagnosis.other_simulator.frame import UNITS, Frame, weighed_frame
+from palpate.diagnosis.other_simulator.frame import UNITS, ForceFormat, weighed_frame
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.mechanics.law_errors import Smallest
 from palpate.mechanics.options import option
@@ -97,7 +97,7 @@ class Aligned:
     force: np.ndarray
     usable: np.ndarray
     notes: tuple[str, ...]
-    frame: Frame = field(default_factory=Frame)
+    frame: ForceFormat = field(default_factory=ForceFormat)
     coarse: str = ""
 
 

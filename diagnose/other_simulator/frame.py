@@ -30,7 +30,7 @@ _NEAR, _FAR = 0.1, 1.1
 
 
 @dataclass(frozen=True)
-class Frame:
+class ForceFormat:
     """How a file's forces are written. axes: which of the recording's axes its fx, fy, fz are ("x,z,-y": y
     up). unit: of UNITS. notes: what was found of them, in words."""
 
@@ -71,7 +71,7 @@ def _every() -> tuple[str, ...]:
 
 def weighed_frame(
     force: np.ndarray, presses: Presses, rows: np.ndarray, *, axes: str, unit: str | None, level: float
-) -> Frame:
+) -> ForceFormat:
     """The frame of forces (n, 3), in the file's numbers, at the presses' rows; `rows` (n,) bool count.
 
     axes, unit: what was stated ("", None: nothing). level: how much stiffer than the model the simulation was
@@ -88,7 +88,7 @@ def weighed_frame(
     if unit is None:
         unit, words = _unit(_ratio(force, presses, rows) / level)
         notes += words
-    return Frame(axes, unit, tuple(notes))
+    return ForceFormat(axes, unit, tuple(notes))
 
 
 def _axes(force: np.ndarray, measured: np.ndarray, sites: int) -> tuple[str, list[str]]:

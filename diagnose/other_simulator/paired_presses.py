@@ -14,7 +14,7 @@ from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.other_simulator.against_law import LEAST_SHARE, Numerics, numerics_of, seen_in_samples
 from palpate.diagnosis.other_simulator.declared_parameters import Stated, StatedForward
 from palpate.diagnosis.other_simulator.forces import Aligned
-from palpate.diagnosis.other_simulator.frame import Frame
+from palpate.diagnosis.other_simulator.frame import ForceFormat
 from palpate.diagnosis.other_simulator.gap_decomposition import law_at
 from palpate.diagnosis.verdict.answer import Findings
 from palpate.mechanics.presses.table import MARGIN_S, Presses
@@ -38,7 +38,7 @@ class Sides:
     fell_s: np.ndarray
     seen: dict[str, dict[str, float]]
     notes: tuple[str, ...]
-    frame: Frame = dataclasses.field(default_factory=Frame)
+    frame: ForceFormat = dataclasses.field(default_factory=ForceFormat)
     coarse: str = ""
 
 

@@ -28,7 +28,7 @@ from palpate.diagnosis.other_simulator.gap_decomposition import (
 )
 from palpate.diagnosis.other_simulator.own_flaws import Own, made_up, own_of, with_same_presses
 from palpate.diagnosis.other_simulator.paired_presses import Sides, named_numerics, pair_forces
-from palpate.diagnosis.other_simulator.result import Part, SimulatedGap, Simulator, advice_of
+from palpate.diagnosis.other_simulator.result import GapPart, SimulatedGap, Simulator, advice_of
 from palpate.diagnosis.pipeline import diagnose
 from palpate.diagnosis.search.gaps import closed_share_ci95
 from palpate.diagnosis.search.rivals import Explanation, joint, likeliest, names_of
@@ -179,9 +179,9 @@ def _concluded(w: _Weighed) -> SimulatedGap:
     findings: Findings = reality.findings
     whole = w.square("simulated")
 
-    def part_of(before: str, after: str, names: Sequence[str]) -> Part:
+    def part_of(before: str, after: str, names: Sequence[str]) -> GapPart:
         drop = w.square(before) - w.square(after)
-        return Part(math.sqrt(max(drop, 0.0)), drop / whole, tuple(names))
+        return GapPart(math.sqrt(max(drop, 0.0)), drop / whole, tuple(names))
 
     parts = {
         "numerics": part_of("simulated", "numerics", numerics.named),

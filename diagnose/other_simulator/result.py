@@ -103,7 +103,7 @@ class Simulator:
 
 
 @dataclass(frozen=True)
-class Part:
+class GapPart:
     """gap_n: N rms that it adds to the gap. share: of the mean square of the gap (below 0: it hides
     others). names: of the effects in it, strongest first."""
 
@@ -167,7 +167,7 @@ class SimulatedGap(Result):
     effects: tuple[str, ...]
     candidates: tuple[str, ...]
     explanations: tuple[Explanation, ...]
-    parts: Mapping[str, Part]
+    parts: Mapping[str, GapPart]
     unexplained: float
     unexplained_n: float
     noise_share: float

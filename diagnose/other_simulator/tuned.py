@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from palpate.diagnosis.other_simulator.runs import Runs, Sums, TruePath, Values
-from palpate.diagnosis.other_simulator.tuning import NEAR, Budget, Search, Trial
+from palpate.diagnosis.other_simulator.tuning import NEAR, Budget, SettingsSearch, Trial
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Clocked, Progress, TimeIsUp, silent, until
 from palpate.mechanics.result import Result
@@ -218,7 +218,7 @@ def tuned(
         words = f"{trials} settings tried, {1e3 * gap_n:.3g} mN off ({1e3 * target_n:.3g} asked)"
         progress(words, min((clock() - begun) / within_s, 1.0))
 
-    search = Search(
+    search = SettingsSearch(
         runs, judged.fitted, adapter.tunables, start, target_n=target_n, step_of=step_of,
         budget=Budget(begun + within_s, *at_most, clock), tell=tell,
         after_s=sum(sums.took_s for sums in before.values()),

@@ -90,7 +90,7 @@ class Budget:
         return max(1.0, trial.ms_per_step / self.ms_per_step, trial.sums.cost / self.cost)
 
 
-class Search:
+class SettingsSearch:
     """Settings of one simulator over some paths. target_n: N, where the search ends; step_of(values): s, of
     the simulator with these; after_s: what is run after the trials took with the start's settings;
     tell(trials, best gap in N): after each trial. time_is_up: whether it ended the search; interrupted:

@@ -21,11 +21,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.diagnosis.search.evidence import Search
+from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.rivals import Choice, Explanation, Names, of_one_phenomenon, posterior
 from palpate.mechanics.effects.base import Effect, Scope
 from palpate.mechanics.progress import Progress, silent
+from palpate.render.replay import rms_n
 
 TRIED = 3
 """So many others are tried, those that gain most by themselves."""
@@ -165,7 +167,9 @@ def attribute(
         first = not chosen
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
-        able = [s for s in scores.values() if search.able(s, first=first) and s.size_n > least]
+        able = [
+            s for s in scores.values() if search.able(s, first=first) and _own_n(search, s, least) > least
+        ]
         if search.forward.measured and search.sideways_off(current):
             able = _not_blind_to_slip(search, able)
         log_odds: dict[Names, float] = {(s.name,): s.log_odds for s in able}
@@ -210,6 +214,20 @@ def attribute(
         base, ideal, deep, steps[0], order, current, posterior(choices, order), tuple(steps),
         taken, strain_gain, strain_closes,
     )  # fmt: skip
+
+
+def _own_n(search: Search, score: Score, least: float) -> float:
+    """N rms by which a score's effect changes the force; of a simulator, in the joint fit with all else as it
+    is there: where what was named before has bent to do its work, the prediction hardly moves."""
+    if search.forward.measured or score.size_n > least:
+        return score.size_n
+    found, forward = score.candidate.found, search.forward
+    without = found.values.copy()
+    without[found.place_of(score.name)] = score.effect.ideal
+    both, rest = (
+        forward.predict(settings_of(forward, found.effects, v, found.onset)) for v in (found.values, without)
+    )
+    return rms_n(np.nan_to_num(both - rest)[forward.touches.counted])
 
 
 def _another(score: Score, best: Score) -> bool:

@@ -1,4 +1,11 @@
-"""The part of a sphere or of an ellipsoid above the support."""
+"""The part of a sphere or of an ellipsoid above the support.
+
+A dome over any base outline: (rho)^p + (z / h)^q = 1 with rho the outline's gauge; the top may lean
+over.
+
+An extrusion whose top edge is rounded over a width: walls, a rounding, and a flat top where it is wide
+enough.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from palpate.reconstruction.shapes.outline import Outline
 from palpate.reconstruction.shapes.shape import ShapeParameter, project, rings_to_mesh, values_of, with_values
 
 
@@ -86,3 +94,138 @@ def _centre(centre: np.ndarray, size_m: float) -> tuple[ShapeParameter, ...]:
         ShapeParameter(f"centre_{k}_m", float(c), s, *b)
         for k, c, s, b in zip("xyz", centre, spreads, bounds, strict=True)
     )
+
+
+@dataclass(frozen=True)
+class Dome:
+    """Every level is the base outline shrunk towards its centre: cushions, breasts, kidneys, rounded columns.
+
+    Parameters: grown_m, height_m, wall_exponent p, cap_exponent q, and how far the top leans, lean_x_m,
+    lean_y_m (growing with the square of the height).
+    """
+
+    outline: Outline
+    parameters: tuple[ShapeParameter, ...]
+    name: str = "dome"
+    complexity: int = 3
+    faceted: bool = False
+
+    @classmethod
+    def of(cls, outline: Outline, height_m: float, exponent: float) -> Dome:
+        """A first guess over an outline."""
+        return cls(
+            outline,
+            (
+                ShapeParameter("grown_m", 0.0, 0.002, -0.008, 0.008),
+                ShapeParameter("height_m", height_m, 0.02, 0.3 * height_m, 3 * height_m),
+                ShapeParameter("wall_exponent", exponent, 1.0, 0.8, 16.0),
+                ShapeParameter("cap_exponent", exponent, 1.0, 0.8, 16.0),
+                ShapeParameter("lean_x_m", 0.0, 0.01, -0.03, 0.03),
+                ShapeParameter("lean_y_m", 0.0, 0.01, -0.03, 0.03),
+            ),
+        )
+
+    def with_values(self, values: np.ndarray) -> Dome:
+        return replace(self, parameters=with_values(self.parameters, values))
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        grown, height, p, q, *lean = values_of(self)
+        rim, _ = self.outline.grown(grown).ring(0.0015)
+        offset = rim - self.outline.centre
+        angle = np.arctan2(offset[:, 1], offset[:, 0])
+        order = np.argsort(angle)
+        angle, radius = angle[order], np.linalg.norm(offset, axis=1)[order]
+
+        def implicit(at: np.ndarray) -> np.ndarray:
+            z = at[:, 2] / height
+            flat = at[:, :2] - self.outline.centre - np.sign(z)[:, None] * (z**2)[:, None] * np.array(lean)
+            rho = np.linalg.norm(flat, axis=1) / np.interp(
+                np.arctan2(flat[:, 1], flat[:, 0]), angle, radius, period=2 * np.pi
+            )
+            # the p-th root keeps it of degree one, so that Newton's steps see nearly straight slopes
+            return (rho**p + np.maximum(z, 0) ** q) ** (1 / p) - 1
+
+        return project(implicit, points)
+
+    def mesh(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        grown, height, p, q, *lean = values_of(self)
+        outline = self.outline.grown(grown)
+        rim, _ = outline.ring(spacing_m)
+        angle = np.linspace(0, np.pi / 2, 400)
+        scale, z = np.cos(angle) ** (2 / p), height * np.sin(angle) ** (2 / q)
+        size = np.linalg.norm(rim - outline.centre, axis=1).mean()
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(scale * size), np.diff(z)))])
+        at = np.linspace(0, length[-1], max(6, int(np.ceil(length[-1] / spacing_m))) + 1)[:-1]
+        scale, z = np.interp(at, length, scale), np.interp(at, length, z)
+        lift = (z / height)[:, None, None] ** 2 * np.array(lean)
+        flat = outline.centre + scale[:, None, None] * (rim - outline.centre) + lift
+        rings = np.concatenate([flat, np.broadcast_to(z[:, None, None], (*flat.shape[:2], 1))], axis=2)
+        vertices, triangles = rings_to_mesh(rings, np.array([*outline.centre, height]))
+        vertices[-1, :2] += lean
+        return vertices, triangles
+
+
+@dataclass(frozen=True)
+class Cushion:
+    """Height falls with the distance s inside the outline: ((w - s) / w)^p + ((z - h + d) / d)^p = 1 for s <
+    w.
+
+    Parameters: grown_m, height_m h, rounding_width_m w, rounding_share d / h, exponent p.
+    """
+
+    outline: Outline
+    parameters: tuple[ShapeParameter, ...]
+    name: str = "cushion"
+    complexity: int = 3
+    faceted: bool = False
+
+    @classmethod
+    def of(cls, outline: Outline, height_m: float, width_m: float) -> Cushion:
+        """A first guess over an outline."""
+        widest = float(-outline.distance(outline.centre[None])[0])
+        return cls(
+            outline,
+            (
+                ShapeParameter("grown_m", 0.0, 0.002, -0.006, 0.006),
+                ShapeParameter("height_m", height_m, 0.02, 0.3 * height_m, 2 * height_m),
+                ShapeParameter("rounding_width_m", min(width_m, 0.9 * widest), 0.005, 0.001, 1.5 * widest),
+                ShapeParameter("rounding_share", min(0.8, width_m / height_m), 0.2, 0.02, 1.0),
+                ShapeParameter("exponent", 2.0, 0.5, 1.0, 6.0),
+            ),
+        )
+
+    def with_values(self, values: np.ndarray) -> Cushion:
+        return replace(self, parameters=with_values(self.parameters, values))
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        grown, height, width, share, p = values_of(self)
+        deep = share * height
+
+        def implicit(at: np.ndarray) -> np.ndarray:
+            u = np.maximum(1 + (self.outline.distance(at[:, :2]) - grown) / width, 0)
+            v = np.maximum(1 + (at[:, 2] - height) / deep, 0)
+            return (u**p + v**p) ** (1 / p) - 1
+
+        return project(implicit, points)
+
+    def mesh(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        grown, height, width, share, p = values_of(self)
+        outline, deep = self.outline.grown(grown), share * height
+        rim, _ = outline.ring(spacing_m)
+        shoulder = height - deep
+        z = np.linspace(0, shoulder, max(2, int(np.ceil(shoulder / spacing_m)) + 1))
+        wall = np.concatenate(
+            [np.broadcast_to(rim, (len(z), *rim.shape)), np.ones((len(z), len(rim), 1))], axis=2
+        )
+        wall[..., 2] *= z[:, None]
+        # towards the centre, dense at the rim where the rounding is steep
+        reach = max(10, int(np.ceil(np.ptp(rim, axis=0).max() / 2 / spacing_m)) + 8)
+        inwards = 1 - np.linspace(0, 1, reach + 1)[1:-1] ** 2
+        flat = outline.centre + inwards[:, None, None] * (rim - outline.centre)
+        u = np.clip(1 + (self.outline.distance(flat.reshape(-1, 2)) - grown) / width, 0, 1).reshape(
+            flat.shape[:2]
+        )
+        roof = np.concatenate([flat, (shoulder + deep * (1 - u**p) ** (1 / p))[..., None]], axis=2)
+        middle = np.clip(1 + (self.outline.distance(outline.centre[None])[0] - grown) / width, 0, 1)
+        apex = np.array([*outline.centre, shoulder + deep * (1 - middle**p) ** (1 / p)])
+        return rings_to_mesh(np.concatenate([wall, roof]), apex)

@@ -13,17 +13,13 @@ from scipy.spatial import cKDTree
 from palpate.mechanics.errors import SurfaceError
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import distance
-from palpate.reconstruction.shapes.cap import Cap
-from palpate.reconstruction.shapes.crown import Crown
-from palpate.reconstruction.shapes.cushion import Cushion
-from palpate.reconstruction.shapes.dish import Dish
-from palpate.reconstruction.shapes.dome import Dome
+from palpate.reconstruction.shapes.cap import Cap, Cushion, Dome
 from palpate.reconstruction.shapes.drawing import draw
 from palpate.reconstruction.shapes.fit import Evidence, ShapeEvidence, fit
 from palpate.reconstruction.shapes.kriging import Explained, explain
 from palpate.reconstruction.shapes.outline import Outline, circle, polygon, seeing_centre, smooth_curve
 from palpate.reconstruction.shapes.polyhedron import Polyhedron
-from palpate.reconstruction.shapes.prism import Prism
+from palpate.reconstruction.shapes.prism import Crown, Dish, Prism
 from palpate.reconstruction.shapes.shape import Shape
 
 FITTED = (

@@ -1,4 +1,9 @@
-"""A base outline drawn upwards to a flat top: cylinder, cone's frustum, block, L-shaped or free extrusion."""
+"""A base outline drawn upwards to a flat top: cylinder, cone's frustum, block, L-shaped or free extrusion.
+
+Upright walls under a top that curves: arches, saddles, cambered blocks.
+
+A prism with a ball taken out of its top: bowls, dished blocks. Not convex.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.reconstruction.shapes.outline import Outline, corners, sides
-from palpate.reconstruction.shapes.shape import ShapeParameter, rings_to_mesh, with_values
+from palpate.reconstruction.shapes.shape import ShapeParameter, project, rings_to_mesh, values_of, with_values
 
 
 def _outline_parameters(outline: Outline) -> tuple[ShapeParameter, ...]:
@@ -144,3 +149,120 @@ def _lean(outline: Outline, rim: np.ndarray, outward: np.ndarray) -> np.ndarray:
     k = np.argmin(miss, axis=1)
     share = np.clip(along[np.arange(len(rim)), k], 0, 1)[:, None]
     return ((1 - share) * (start - moved)[k] + share * (start - moved)[ends[k]]) / 1e-4
+
+
+@dataclass(frozen=True)
+class Crown:
+    """The upright prism's parameters, then slope_x, slope_y (1) and bend_xx, bend_xy, bend_yy (1/m) of the
+    top: z = height + slope . d + d . bend . d / 2 with d from the outline's centre."""
+
+    prism: Prism
+    parameters: tuple[ShapeParameter, ...]
+    name: str = "crown"
+    complexity: int = 5  # outline, slope, three bends
+    faceted: bool = True
+
+    @classmethod
+    def of(cls, outline: Outline, height_m: float) -> Crown:
+        """A first guess over an outline."""
+        prism = Prism.of(outline, height_m, sloped=False, drafted=False)
+        slopes = (ShapeParameter("slope_x", 0.0, 0.2, -2, 2), ShapeParameter("slope_y", 0.0, 0.2, -2, 2))
+        bends = tuple(ShapeParameter(f"bend_{k}", 0.0, 8.0, -60, 60) for k in ("xx", "xy", "yy"))
+        return cls(prism, (*prism.parameters, *slopes, *bends))
+
+    def with_values(self, values: np.ndarray) -> Crown:
+        return replace(
+            self, prism=self.prism.with_values(values[:-5]), parameters=with_values(self.parameters, values)
+        )
+
+    def _top(self, flat: np.ndarray) -> np.ndarray:
+        sx, sy, xx, xy, yy = values_of(self)[-5:]
+        x, y = (flat - self.prism.outline.centre).T
+        return self.prism.height + sx * x + sy * y + 0.5 * (xx * x * x + 2 * xy * x * y + yy * y * y)
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        wall = self.prism.wall_distance(points)
+        top = project(lambda at: at[:, 2] - self._top(at[:, :2]), points, rounds=3)
+        return np.hypot(np.maximum(wall, 0), np.maximum(top, 0)) + np.minimum(np.maximum(wall, top), 0)
+
+    def mesh(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        rim, centre = self.prism.rim(spacing_m), self.prism.outline.centre
+        edge = np.maximum(self._top(rim), 0.001)
+        levels = np.linspace(0, 1, max(3, int(np.ceil(edge.max() / spacing_m)) + 1))
+        wall = [np.column_stack([rim, edge * u]) for u in levels]
+        inwards = np.linspace(1, 0, max(6, int(np.ceil(np.ptp(rim, axis=0).max() / 2 / spacing_m)) + 1))[1:-1]
+        flats = [centre + u * (rim - centre) for u in inwards]
+        roof = [np.column_stack([f, np.maximum(self._top(f), 0.001)]) for f in flats]
+        return rings_to_mesh(np.array([*wall, *roof]), np.array([*centre, self._top(centre[None])[0]]))
+
+
+@dataclass(frozen=True)
+class Dish:
+    """The prism's parameters, then ball_x_m, ball_y_m, ball_z_m (its centre) and ball_radius_m.
+
+    Nobody touches the rim, so its height is known from the highest touch only: its prior stands half a touch
+    spacing above, as far as hands keep away from edges.
+    """
+
+    prism: Prism
+    parameters: tuple[ShapeParameter, ...]
+    name: str = "dish"
+    complexity: int = 4
+    faceted: bool = True
+
+    @classmethod
+    def of(cls, outline: Outline, height_m: float, bottom: np.ndarray) -> Dish:
+        """A first guess: the rim's height, and the lowest place (3,) touched in the dish."""
+        prism = Prism.of(outline, height_m, sloped=False, drafted=False)
+        deep = max(height_m - bottom[2], 0.004)
+        mouth = 0.75 * float(np.abs(outline.distance(outline.centre[None])[0]))
+        radius = (mouth**2 + deep**2) / (2 * deep)
+        ball = (
+            ShapeParameter("ball_x_m", float(outline.centre[0]), 0.01),
+            ShapeParameter("ball_y_m", float(outline.centre[1]), 0.01),
+            ShapeParameter("ball_z_m", float(bottom[2] + radius), 0.02),
+            ShapeParameter("ball_radius_m", float(radius), 0.02, 0.006, 0.5),
+        )
+        own = tuple(replace(p, spread=0.004) if p.label == "height_m" else p for p in prism.parameters)
+        return cls(prism, (*own, *ball))
+
+    def with_values(self, values: np.ndarray) -> Dish:
+        return replace(
+            self, prism=self.prism.with_values(values[:-4]), parameters=with_values(self.parameters, values)
+        )
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        *centre, radius = values_of(self)[-4:]
+        return np.maximum(self.prism.distance(points), radius - np.linalg.norm(points - centre, axis=1))
+
+    def mesh(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        *centre, radius = values_of(self)[-4:]
+        vertices, triangles = self.prism.mesh(spacing_m)
+        rim = self.prism.rim(spacing_m)
+        height = float(self.prism.height)
+        middle = np.array(centre[:2])
+        # rays from the ball's axis to the rim: the mouth is where the ball leaves the top's plane
+        offset = rim - middle
+        reach = np.linalg.norm(offset, axis=1)
+        mouth = (
+            np.sqrt(max(radius**2 - (centre[2] - height) ** 2, 0.0)) if centre[2] - radius < height else 0.0
+        )
+        edge = np.minimum(mouth, 0.98 * reach)
+        if mouth < 2 * spacing_m or self.prism.outline.distance(middle[None])[0] > -0.005:
+            return vertices, triangles
+        levels = np.linspace(0, 1, max(3, int(np.ceil(height / spacing_m)) + 1))
+        wall = [np.column_stack([rim, np.full(len(rim), height * u)]) for u in levels]
+        steps = max(2, int(np.ceil((reach - edge).max() / spacing_m)))
+        unit = offset / reach[:, None]
+        flat = [
+            np.column_stack(
+                [middle + (reach + (edge - reach) * u)[:, None] * unit, np.full(len(rim), height)]
+            )
+            for u in np.linspace(0, 1, steps + 1)[1:]
+        ]
+        down = []
+        for u in np.linspace(1, 0, max(5, int(np.ceil(edge.max() / spacing_m))) + 1)[1:-1]:
+            away = u * edge
+            z = np.minimum(centre[2] - np.sqrt(np.maximum(radius**2 - away**2, 0)), height)
+            down.append(np.column_stack([middle + away[:, None] * unit, z]))
+        return rings_to_mesh(np.array([*wall, *flat, *down]), np.array([*middle, centre[2] - radius]))

@@ -21,9 +21,8 @@ import numpy as np
 
 from palpate.mechanics.disk.writing import atomic_file, check_room
 from palpate.mechanics.progress import Progress, silent
-from palpate.scenes.laboratory.linear import LinearProblem
 from palpate.scenes.laboratory.mesh import coarse_mesh, laboratory_cache, surface_key
-from palpate.scenes.laboratory.solver import LabError
+from palpate.scenes.laboratory.solver import LabError, LinearProblem
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
 from palpate.scenes.phantoms import Phantom
 

@@ -16,10 +16,9 @@ import numpy as np
 
 from palpate.scenes.laboratory.contact import SphereContact
 from palpate.scenes.laboratory.field import Field, ratio_at
-from palpate.scenes.laboratory.linear import LinearProblem
 from palpate.scenes.laboratory.mesh import QuadraticMesh, graded_mesh
 from palpate.scenes.laboratory.solid import Solid, SolidMaterial
-from palpate.scenes.laboratory.solver import Driven, Problem
+from palpate.scenes.laboratory.solver import Driven, LinearProblem, Problem
 from palpate.scenes.laboratory.surface import TriangleSurface
 from palpate.scenes.phantoms import Phantom
 

@@ -10,15 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from palpate.diagnosis.specimen.bench import MachineCycle
-from palpate.importing.mapping import Column
+from palpate.importing.mapping import Column, vocabulary
 from palpate.importing.meaning import (
     BestReading,
     Unclear,
     best,
     press_scores,
 )
-from palpate.importing.units import SI, without_unit
-from palpate.importing.vocabulary import vocabulary
+from palpate.importing.tables import SI, without_unit
 from palpate.mechanics.errors import ContactError, RecordingError
 from palpate.mechanics.plausible import CURVE, UNIT_SHARES
 

@@ -33,8 +33,7 @@ from palpate.importing.meaning import (
     settled_clock,
 )
 from palpate.importing.side_by_side import side_by_side
-from palpate.importing.tables import Table, read_tables
-from palpate.importing.units import SI, unit_in, without_unit
+from palpate.importing.tables import SI, Table, read_tables, unit_in, without_unit
 from palpate.mechanics.bounds import LARGEST_N
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import EXPLORATION

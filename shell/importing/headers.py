@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from palpate.importing.formats.registry import SHEET_SUFFIXES, TEXT_SUFFIXES
 from palpate.importing.formats.sheets import lines_of
 from palpate.importing.formats.text import decoded
-from palpate.importing.units import SI
+from palpate.importing.tables import SI
 from palpate.mechanics.disk.reading import read_toml
 from palpate.mechanics.disk.schema import check_table
 from palpate.mechanics.errors import RecordingError

@@ -12,28 +12,57 @@ A mapping file is TOML:
     [clock]     offset_s (of the force's clock; "auto" by cross-correlation), rate_hz
     [tare]      start_s, end_s: the mean force there is taken off
     [object]    name, poisson_ratio, shape, shape_unit, shape_pose, slab_m, half_space
+
+What the name of a column says of it, by the words of vocabulary.toml.
 """
 
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from os.path import commonprefix
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from palpate.importing.tables import Table
-from palpate.importing.units import SI, plain, unit_in, unit_since_1970, without_unit
-from palpate.importing.vocabulary import says, vocabulary
+from palpate.importing.tables import SI, Table, plain, unit_in, unit_since_1970, without_unit
 from palpate.mechanics.disk.reading import read_toml
 from palpate.mechanics.disk.schema import ANY, FileKey, Schema, check_table
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import MACHINE_TIP_RADIUS, TOOL_MASS
 from palpate.mechanics.recording.files import SCHEMA
 from palpate.words import listed
+
+_AXES = {"x": "x|0", "y": "y|1", "z": "z|2"}
+
+
+@lru_cache(maxsize=1)
+def vocabulary() -> Mapping[str, Any]:
+    """The tables of vocabulary.toml."""
+    return tomllib.loads(Path(__file__).with_name("vocabulary.toml").read_text(encoding="utf-8"))
+
+
+@lru_cache(maxsize=16)
+def says(role: str) -> re.Pattern[str]:
+    """What the letters and digits of a whole name match that says the role."""
+    held = vocabulary()
+    if role == "t":
+        return re.compile("|".join(held["time"]["names"]))
+    words = held["words"]
+    body, nothing = "|".join(words["body"]), "|".join(words["nothing"])
+    exactly = [role, *held["exactly"].get(role, [])]
+    if role.startswith("q"):
+        own, other, axes = "|".join(words["quaternion"]), f"{body}|{nothing}", f"{role}|{role[1]}"
+    elif role.startswith("f"):
+        own, other, axes = "|".join(words["force"]), f"{body}|{nothing}", _AXES[role[1]]
+    else:
+        own, other, axes = "|".join([*words["position"], body]), nothing, _AXES[role]
+    return re.compile(f"{'|'.join(exactly)}|(?:{other})*(?:{own})(?:{own}|{other})*(?:{axes})")
+
 
 ROLES = ("t", "x", "y", "z", "fx", "fy", "fz", "qw", "qx", "qy", "qz")
 KIND = {"t": "time", **dict.fromkeys("xyz", "position"), **dict.fromkeys(("fx", "fy", "fz"), "force")}

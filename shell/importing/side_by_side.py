@@ -9,8 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate.importing.mapping import named_first
-from palpate.importing.tables import Table
-from palpate.importing.units import without_unit
+from palpate.importing.tables import Table, without_unit
 
 _NUMBERED = re.compile(r"\s*#\d+$")
 """What a reader puts behind a name that was there before."""

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from palpate.diagnosis.specimen.baseline import form_scores
 from palpate.diagnosis.specimen.bench import MachineCycle
-from palpate.diagnosis.specimen.tip_form import form_scores
 from palpate.importing.meaning import MOST_ODDS, Unclear, best
 from palpate.mechanics.contact.tip import POINTED, WORDS, other_tip
 from palpate.mechanics.errors import ContactError, RecordingError

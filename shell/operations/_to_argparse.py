@@ -15,8 +15,7 @@ from palpate.mechanics.disk.writing import JSON
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.names import near, unknown
 from palpate.mechanics.options import check_range, flag_of
-from palpate.operations._declare import GREATEST, OnCommandLine, Operation, declared, written
-from palpate.operations._fields import type_words
+from palpate.operations._declare import GREATEST, OnCommandLine, Operation, declared, type_words, written
 
 _DEFAULT = re.compile(r" *\(default: ([^()]*(?:\([^()]*\)[^()]*)*)\)")
 _UNIT = re.compile(r" *\[([^\[\]]{1,9})\](?=$| \()")

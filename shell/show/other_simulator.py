@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.diagnosis.numerics.registry import NAMES, numerical
 from palpate.diagnosis.other_simulator.frame import AS_RECORDED
-from palpate.diagnosis.other_simulator.result import PARTS, Part, SimulatedGap
+from palpate.diagnosis.other_simulator.result import PARTS, GapPart, SimulatedGap
 from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.registry import effect
@@ -262,7 +262,7 @@ def _parts(result: SimulatedGap) -> say.Story:
     yield say.Cards(cards)
 
 
-def part_words(part: Part) -> str:
+def part_words(part: GapPart) -> str:
     """What a part adds to the gap, and its share of the mean square; one that takes off adds nothing that has
     a size, and hides another error."""
     if part.share > -LEAST_SHARE:

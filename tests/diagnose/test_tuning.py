@@ -17,7 +17,7 @@ import palpate as pp
 from palpate.cli import main
 from palpate.diagnosis.other_simulator.runs import Runs, Sums, TruePath
 from palpate.diagnosis.other_simulator.tuned import Judged, Moved, tuned
-from palpate.diagnosis.other_simulator.tuning import Budget, Search, Trial
+from palpate.diagnosis.other_simulator.tuning import Budget, SettingsSearch, Trial
 from palpate.exporting.settings import SUFFIXES
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
@@ -92,7 +92,7 @@ def search(model, target_n=0.02, **more):
     runs = Runs("springs", RenderOptions())
     start = {"idle": 1.0, "n_s_per_m": 1.0, "n_per_m": 100.0}
     paths = [press(model, d) for d in (0.001, 0.002)]
-    return Search(
+    return SettingsSearch(
         runs, paths, Springs.tunables, start, target_n=target_n, step_of=lambda values: 1e-3, **more
     )
 

@@ -10,7 +10,7 @@ import palpate as pp
 from palpate.mechanics.compliance.sites import SURFACE_EDGE_M
 from palpate.mechanics.shape import refine
 from palpate.mechanics.shape.refine import typical_wall
-from palpate.scenes.meshed import CoarserMesh
+from palpate.scenes.build import CoarserMesh
 
 
 def _tube(wall_m: float) -> trimesh.Trimesh:

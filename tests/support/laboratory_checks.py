@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.scenes.laboratory.contact import SphereContact
-from palpate.scenes.laboratory.linear import LinearProblem
 from palpate.scenes.laboratory.mesh import QuadraticMesh, quadratic, refine
 from palpate.scenes.laboratory.solid import Solid, SolidMaterial
+from palpate.scenes.laboratory.solver import LinearProblem
 from palpate.scenes.laboratory.specimen import Fineness, Specimen, build
 from palpate.scenes.phantoms import Phantom
 

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.importing.tables import Table
-from palpate.importing.units import is_unit, without_unit
+from palpate.importing.tables import Table, is_unit, without_unit
 from palpate.mechanics.errors import RecordingError
 
 _SEPARATORS = ("\t", ";", ",", "|", None)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.diagnosis.specimen.baseline import without_slope
+from palpate.diagnosis.specimen.baseline import form_scores, without_slope
 from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests
-from palpate.diagnosis.specimen.tip_form import form_scores
 from palpate.mechanics.contact.dent import dent_law
 from palpate.mechanics.contact.tip import Tip
 

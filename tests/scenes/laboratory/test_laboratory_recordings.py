@@ -18,8 +18,7 @@ from palpate.scenes.laboratory.effects import REGISTRY
 from palpate.scenes.laboratory.effects.contact import UNNAMED, relaxed
 from palpate.scenes.laboratory.sealing import opened
 from palpate.scenes.laboratory.session import Staging
-from palpate.scenes.laboratory.simulate import SimulateOptions, simulate
-from palpate.scenes.laboratory.truth import size_of
+from palpate.scenes.laboratory.simulate import SimulateOptions, simulate, size_of
 from palpate.scenes.phantoms import phantom
 
 CONTRACT = set(

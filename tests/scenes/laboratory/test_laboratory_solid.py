@@ -11,10 +11,9 @@ from scipy.integrate import trapezoid
 from palpate.mechanics.contact.dent import dent_law
 from palpate.scenes.laboratory.contact import SphereContact
 from palpate.scenes.laboratory.effects.contact import relaxed
-from palpate.scenes.laboratory.linear import LinearProblem
 from palpate.scenes.laboratory.mesh import boundary_faces
 from palpate.scenes.laboratory.solid import Solid, SolidMaterial
-from palpate.scenes.laboratory.solver import Mixing, Problem
+from palpate.scenes.laboratory.solver import LinearProblem, Mixing, Problem
 from palpate.scenes.laboratory.specimen import Fineness, Specimen
 from palpate.scenes.phantoms import phantom
 

@@ -16,8 +16,7 @@ import pytest
 
 import palpate as pp
 from palpate.devices.codecs import spacemouse
-from palpate.exporting.page.contents import ONE_D, force_band, shown_modes
-from palpate.exporting.page.document import button, page_of
+from palpate.exporting.page.document import ONE_D, button, force_band, page_of, shown_modes
 from palpate.exporting.page.tables import first_depth, modes_of
 from palpate.mechanics.effects.registry import effect
 from palpate.mechanics.model.files import read_model, write_model
