@@ -139,71 +139,15 @@ def attribute(
 
     seen: names that are known to be there from elsewhere: they are taken first, and stay.
     """
-    fs = search.finite_strain
-    ideal, deep = search.judge([]), search.judge([fs])
-    _, strain_gain, strain_closes = _with_strain(search, [])
-    base = deep if strain_gain > -search.options.beyond_doubt else ideal
-    current = base
-    chosen: list[str] = []
-    steps: list[dict[str, Score]] = []
-    choices: list[Choice] = []
-    for step in range(search.options.greatest_number):
-        scores: dict[str, Score] = {}
-        for i, effect in enumerate(effects):
-            if effect.name in current.found.names or of_one_phenomenon(effect, current.found.effects):
-                continue
-            if of_one_phenomenon(effect, effects[:i]):
-                continue  # of the laws of one phenomenon the first stands for all until it is picked
-            progress(
-                f"effect {step + 1}: {effect.name}",
-                (step + i / len(effects)) / search.options.greatest_number,
-            )
-            candidate = search.judge([*current.found.effects, effect], like=current)
-            if not chosen:
-                candidate = _with_hidden_strain(search, effect, candidate, current)
-            scores[effect.name] = search.score([effect], candidate, current)
-        if not scores:
+    forward = _Selection(search, effects, seen)
+    most = search.options.greatest_number
+    for step in range(most):
+        if not forward.step(
+            lambda words, x, step=step: progress(f"effect {step + 1}: {words}", (step + x) / most)
+        ):
             break
-        first = not chosen
-        steps.append(scores)
-        least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
-        able = [
-            s for s in scores.values() if search.able(s, first=first) and _own_n(search, s, least) > least
-        ]
-        if search.forward.measured and search.sideways_off(current):
-            able = _not_blind_to_slip(search, able)
-        log_odds: dict[Names, float] = {(s.name,): s.log_odds for s in able}
-        known = [scores[n] for n in sorted(seen) if n in scores]
-        known = [s for s in known if s.size_n > search.smallest_n]
-        passing = known or [s for s in able if s.probability > search.options.sure]
-        if not passing:
-            pair = None
-            if step + 2 <= search.options.greatest_number:
-                pair = _paired(search, _able_together(search, effects, current, scores), current)
-            if pair is None:
-                choices.append(Choice(log_odds, ()))
-                break
-            names = tuple(e.name for e in pair.added)
-            choices.append(Choice({**log_odds, names: pair.log_odds}, names))
-            chosen += names
-            search.renew(pair.candidate.found)
-            current, strain_gain, strain_closes = _with_strain(search, pair.candidate.found.effects)
-            break
-        best = max(passing, key=lambda s: s.log_odds)
-        for effect in effects:
-            if of_one_phenomenon(effect, [best.effect]) and effect.name not in scores:
-                candidate = search.judge([*current.found.effects, effect], like=current)
-                scores[effect.name] = search.score([effect], candidate, current)
-        best = _best_law(
-            search, [s for s in scores.values() if of_one_phenomenon(s.effect, [best.effect])], best
-        )
-        chosen.append(best.name)
-        others = {n: x for n, x in log_odds.items() if _another(scores[n[0]], best)}
-        choice = Choice({**others, (best.name,): best.log_odds}, (best.name,), certain=bool(known))
-        search.renew(best.candidate.found)
-        choices.append(_told_apart(search, choice, scores, best))
-        current, strain_gain, strain_closes = _with_strain(search, best.candidate.found.effects)
-    taken = tuple(chosen)[: len(steps)]
+    steps, current, chosen = forward.steps, forward.current, forward.chosen
+    picked = tuple(chosen)[: len(steps)]
     current, chosen = _without_idle(search, chosen, current, seen)
     if any(n not in seen for n in chosen):
         current, chosen = drop_redundant(search, chosen, current, steps[0], seen)
@@ -211,9 +155,109 @@ def attribute(
         current = _refined(search, effect, current)
     order = tuple(_strongest_first(search, current, chosen))
     return Attribution(
-        base, ideal, deep, steps[0], order, current, posterior(choices, order), tuple(steps),
-        taken, strain_gain, strain_closes,
+        forward.base, forward.ideal, forward.deep, steps[0], order, current,
+        posterior(forward.choices, order), tuple(steps), picked, forward.strain_gain, forward.strain_closes,
     )  # fmt: skip
+
+
+class _Selection:
+    """Forward selection: each step scores every effect on what is there, and takes the likeliest, two that
+    close the gap only together, or nothing more.
+
+    base: linear or neo-Hookean, as the data prefer it; current: the set so far; chosen: its names in order;
+    steps: the scores of each step; choices: what each took; strain_gain, strain_closes: of finite strain in
+    the set (`_with_strain`).
+    """
+
+    def __init__(self, search: Search, effects: Sequence[Effect], seen: frozenset[str]) -> None:
+        self.search, self.effects, self.seen = search, effects, seen
+        self.ideal, self.deep = search.judge([]), search.judge([search.finite_strain])
+        _, self.strain_gain, self.strain_closes = _with_strain(search, [])
+        self.base = self.deep if self.strain_gain > -search.options.beyond_doubt else self.ideal
+        self.current = self.base
+        self.chosen: list[str] = []
+        self.steps: list[dict[str, Score]] = []
+        self.choices: list[Choice] = []
+
+    def step(self, progress: Progress) -> bool:
+        """Whether one effect was taken, so that there may be more."""
+        scores = self._scores(progress)
+        if not scores:
+            return False
+        self.steps.append(scores)
+        able = self._able(scores)
+        odds: dict[Names, float] = {(s.name,): s.log_odds for s in able}
+        known = [scores[n] for n in sorted(self.seen) if n in scores]
+        known = [s for s in known if s.size_n > self.search.smallest_n]
+        likely = known or [s for s in able if s.probability > self.search.options.sure]
+        if likely:
+            self._take_one(max(likely, key=lambda s: s.log_odds), scores, odds, certain=bool(known))
+        else:
+            self._take_two(scores, odds)
+        return bool(likely)
+
+    def _scores(self, progress: Progress) -> dict[str, Score]:
+        """Of every effect that is not there; of the laws of one phenomenon the first stands for all until it
+        is picked."""
+        scores: dict[str, Score] = {}
+        there = self.current.found
+        for i, effect in enumerate(self.effects):
+            if effect.name in there.names or of_one_phenomenon(effect, [*there.effects, *self.effects[:i]]):
+                continue
+            progress(effect.name, i / len(self.effects))
+            candidate = self.search.judge([*there.effects, effect], like=self.current)
+            if not self.chosen:
+                candidate = _with_hidden_strain(self.search, effect, candidate, self.current)
+            scores[effect.name] = self.search.score([effect], candidate, self.current)
+        return scores
+
+    def _able(self, scores: dict[str, Score]) -> list[Score]:
+        """What may be there: it foretells places, and changes enough beside the first."""
+        search, first = self.search, self.chosen[:1]
+        least = search.options.least_of_first * max((self.steps[0][n].size_n for n in first), default=0.0)
+        able = [s for s in scores.values() if search.able(s, first=not first)]
+        able = [s for s in able if _own_n(search, s, least) > least]
+        if search.forward.measured and search.sideways_off(self.current):
+            able = _not_blind_to_slip(search, able)
+        return able
+
+    def _take_one(
+        self, best: Score, scores: dict[str, Score], odds: dict[Names, float], certain: bool
+    ) -> None:
+        """The likeliest, by that law of its phenomenon which has the most evidence."""
+        for effect in self.effects:
+            if of_one_phenomenon(effect, [best.effect]) and effect.name not in scores:
+                candidate = self.search.judge([*self.current.found.effects, effect], like=self.current)
+                scores[effect.name] = self.search.score([effect], candidate, self.current)
+        laws = [s for s in scores.values() if of_one_phenomenon(s.effect, [best.effect])]
+        best = _best_law(self.search, laws, best)
+        others = {n: x for n, x in odds.items() if _another(scores[n[0]], best)}
+        choice = Choice({**others, (best.name,): best.log_odds}, (best.name,), certain)
+        self._settle(best)
+        self.choices.append(_told_apart(self.search, choice, scores, best))
+        self._weigh_strain(best)
+
+    def _take_two(self, scores: dict[str, Score], odds: dict[Names, float]) -> None:
+        """Two that close the gap only together, where as many may still be named; else nothing more."""
+        pair = None
+        if len(self.steps) < self.search.options.greatest_number:
+            able = _able_together(self.search, self.effects, self.current, scores)
+            pair = _paired(self.search, able, self.current)
+        if pair is None:
+            self.choices.append(Choice(odds, ()))
+            return
+        names = tuple(e.name for e in pair.added)
+        self.choices.append(Choice({**odds, names: pair.log_odds}, names))
+        self._settle(pair)
+        self._weigh_strain(pair)
+
+    def _settle(self, taken: Score) -> None:
+        self.chosen += [e.name for e in taken.added]
+        self.search.renew(taken.candidate.found)
+
+    def _weigh_strain(self, taken: Score) -> None:
+        found = _with_strain(self.search, taken.candidate.found.effects)
+        self.current, self.strain_gain, self.strain_closes = found
 
 
 def _own_n(search: Search, score: Score, least: float) -> float:
