@@ -389,7 +389,7 @@ def _tables(
     if placed is not None:
         tables["geometry"] = placed.about
     if sites is not None:
-        tables["linear_range"] = linear_range(sites, tip_radius_m).table()
+        tables["linear_range"] = linear_range(sites, tip_radius_m)
     return tables
 
 

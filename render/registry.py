@@ -1,4 +1,5 @@
-"""The renderers by name, and the module whose `create(name, model, options, progress)` makes each."""
+"""The renderers by name, and the module whose `create(name, model, options, progress)` makes each; of another
+simulator its adapter."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ from palpate.render.options import RenderOptions
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
     from palpate.render.base import Renderer
+    from palpate.render.simulators.base import Adapter
 
 RENDERERS = {
     "fem": "palpate.render.fem.renderer",
@@ -23,10 +25,10 @@ RENDERERS = {
 """Our own."""
 
 _SIMULATORS = {
-    "scikit-fem": "palpate.render.simulators.scikit_fem",
-    "mujoco": "palpate.render.simulators.mujoco",
-    "drake": "palpate.render.simulators.drake",
-    "newton": "palpate.render.simulators.newton",
+    "scikit-fem": "palpate.render.simulators.scikit_fem:ScikitFem",
+    "mujoco": "palpate.render.simulators.mujoco:MuJoCo",
+    "drake": "palpate.render.simulators.drake:Drake",
+    "newton": "palpate.render.simulators.newton:Newton",
 }
 """Other simulators, which need packages of their own and take their time."""
 
@@ -44,13 +46,17 @@ def simulator_names() -> tuple[str, ...]:
 def check_settings(name: str, settings: str, numbers: str) -> None:
     """Raise OptionError for a simulator that is not installed, or for numbers (KEY=VALUE, comma separated)
     that its settings do not have, before any work."""
-    from palpate.render.simulators.base import Adapter, changed, installed
+    from palpate.render.simulators.base import changed, installed
 
-    module = importlib.import_module(_SIMULATORS[name])
-    for each in vars(module).values():
-        if isinstance(each, type) and issubclass(each, Adapter) and each.__module__ == module.__name__:
-            installed(each)
-    changed(module.SETTINGS[settings], numbers)
+    installed(adapter_of(name))
+    changed(adapter_of(name).settings[settings], numbers)
+
+
+def adapter_of(name: str) -> type[Adapter]:
+    """The adapter of a simulator, installed or not."""
+    module, _, kind = _SIMULATORS[name].partition(":")
+    adapter: type[Adapter] = getattr(importlib.import_module(module), kind)
+    return adapter
 
 
 def create(
@@ -70,6 +76,10 @@ def create(
     known = {**RENDERERS, **_SIMULATORS}
     if name not in known:
         raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(known)}")
+    options = options or RenderOptions()
+    if name in _SIMULATORS:
+        from palpate.render.simulators.base import SimulatorRenderer
+
+        return SimulatorRenderer(name, model, adapter_of(name), options)
     kept = {"on_demand": on_demand, "coarse": coarse} if name == "fem" else {}
-    module = importlib.import_module(known[name])
-    return module.create(name, model, options or RenderOptions(), progress, **kept)
+    return importlib.import_module(known[name]).create(name, model, options, progress, **kept)

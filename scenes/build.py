@@ -194,10 +194,6 @@ def _from_phantom(scene: Scene, progress: Progress) -> Model:
     return meshed(scene, stood, own, about, progress)
 
 
-def _from_mesh(scene: Scene, progress: Progress) -> Model:
-    return model_of_mesh(scene.source, scene, progress)
-
-
 def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Model:
     """The model of a surface's file, or of a mesh with `vertices` and `faces` in the scene's unit, in its
     own frame.
@@ -254,10 +250,6 @@ def _from_recording(scene: Scene, progress: Progress) -> Model:
     return _changed(scene, reconstruct(read_recording(recording_path(scene)), progress=progress))
 
 
-def _from_model(scene: Scene, progress: Progress) -> Model:
-    return _changed(scene, read_model(scene.source))
-
-
 def _changed(scene: Scene, model: Model) -> Model:
     """What the scene says over what the model holds."""
     if scene.one_modulus_pa is not None:
@@ -270,4 +262,9 @@ def _changed(scene: Scene, model: Model) -> Model:
     return model.replaced(tool=tool, path=None)
 
 
-_MAKERS = {"phantom": _from_phantom, "mesh": _from_mesh, "recording": _from_recording, "model": _from_model}
+_MAKERS = {
+    "phantom": _from_phantom,
+    "mesh": lambda scene, progress: model_of_mesh(scene.source, scene, progress),
+    "recording": _from_recording,
+    "model": lambda scene, progress: _changed(scene, read_model(scene.source)),
+}

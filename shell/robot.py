@@ -160,14 +160,10 @@ class LaboratoryRobot:
 
     def carry_out(self, suggestion: Suggestion) -> Segment:
         """What the device reads while the suggestion is followed. Raises SceneError where it misses."""
-        if suggestion.kind == "trace":
-            made = self._simulated([self._aside()], self.seed)
+        if suggestion.kind in ("trace", "retrace"):
+            made = self._simulated([self._aside()], self.seed + (suggestion.kind == "retrace"))
             # with the way to a touch that is only laid down to have one: free air, which tells the noise
-            end = int(np.argmax(made.motion.touch >= 0))
-            return self._part(made, "trace", 0, end)
-        if suggestion.kind == "retrace":
-            made = self._simulated([self._aside()], self.seed + 1)
-            return self._part(made, "retrace", 0, int(np.argmax(made.motion.touch >= 0)))
+            return self._part(made, suggestion.kind, 0, int(np.argmax(made.motion.touch >= 0)))
         if suggestion.kind in ("rigid", "free"):
             return self._without_object(suggestion.kind)
         self._touches.append(self._touch(suggestion))

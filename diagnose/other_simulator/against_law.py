@@ -145,7 +145,7 @@ def numerics_of(
     candidates = tuple(n for n in likely if n not in kept.names)
     return Numerics(
         kept.names, candidates, explanations, keys, intervals, probability, force, law, together,
-        law_of(best.found), remainder, tuple(reasons), gain, limits,
+        tuple(e for e in best.found.effects if e.role is Role.KNOWN), remainder, tuple(reasons), gain, limits,
         {name: best.found.of(name) for name in kept.names}, found,
     )  # fmt: skip
 
@@ -195,11 +195,6 @@ def _squares(search: Search, found: Fit) -> np.ndarray:
         again = _without(search, found, fold)
         out[fold] = search.whitener.raw_gram(again.residual[:, :, None])[fold, 0, 0]
     return out
-
-
-def law_of(found: Fit) -> tuple[Effect, ...]:
-    """The effects of a fit that are no flaw: finite strain, where the simulator has it."""
-    return tuple(e for e in found.effects if e.role is Role.KNOWN)
 
 
 def _without(search: Search, found: Fit, fold: np.ndarray) -> Fit:

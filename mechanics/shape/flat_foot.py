@@ -177,18 +177,15 @@ def _hanging(vertices: np.ndarray, triangles: np.ndarray, foot: np.ndarray) -> t
     left = [k for k in left if k not in held]
     for at in held:  # which grows
         box = np.reshape(drawn[at].bounds, (3, 2))
-        for k in [k for k in left if _meet(box, np.reshape(drawn[k].bounds, (3, 2)))]:
+        for k in list(left):
             other = np.reshape(drawn[k].bounds, (3, 2))
+            if (box[:, 0] > other[:, 1]).any() or (other[:, 0] > box[:, 1]).any():
+                continue
             inside = (other[:, 0] >= box[:, 0]).all() and (other[:, 1] <= box[:, 1]).all()
             if inside or drawn[at].collision(drawn[k], contact_mode=1)[1] > 0:
                 held.append(k)
                 left.remove(k)
     return float(volumes[left].sum() / np.maximum(volumes, 0.0).sum()), np.isin(owner, left)
-
-
-def _meet(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two boxes (3, 2) overlap or touch."""
-    return bool((one[:, 0] <= other[:, 1]).all() and (other[:, 0] <= one[:, 1]).all())
 
 
 def _graph(triangles: np.ndarray, count: int) -> coo_matrix:

@@ -248,12 +248,14 @@ class SimulatedState(NamedTuple):
 
 
 class SimulatorRenderer(Renderer):
-    """Another simulator as a renderer: it takes its own time, and no servo should wait for it.
+    """Another simulator as a renderer: it takes its own time, and no servo should wait for it. Raises
+    OptionError where it is not installed.
 
     spent_s: of the processor, for touches of simulated_s.
     """
 
     def __init__(self, name: str, model: Model, adapter: type[Adapter], options: RenderOptions) -> None:
+        installed(adapter)
         self.name, self.model, self.options = name, model, options
         self.contact = touched_surface(model, options)
         self.adapter = adapter(model, options, friction_of(model, options))
@@ -335,9 +337,3 @@ def installed(adapter: type[Adapter]) -> None:
             importlib.import_module(name)
     except ImportError as error:
         raise missing(adapter, error) from error
-
-
-def made(adapter: type[Adapter], model: Model, options: RenderOptions) -> Any:
-    """The renderer of an adapter; raises OptionError where the simulator is not installed."""
-    installed(adapter)
-    return SimulatorRenderer(adapter.name, model, adapter, options)

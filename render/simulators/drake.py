@@ -13,11 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.mechanics.model.model import Model
-from palpate.mechanics.progress import Progress, silent
-from palpate.render.base import Renderer
-from palpate.render.options import BEST, DOCUMENTED, RenderOptions
-from palpate.render.simulators.base import ScriptedAdapter, made
+from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.simulators.base import ScriptedAdapter
 from palpate.render.simulators.tunable import EDGES, Tunable, density
 
 
@@ -77,8 +74,3 @@ class Drake(ScriptedAdapter):
         "time_step": "a smaller time_step of the plant: --simulator-set timestep_s=0.001",
         "lost_contact": "a smaller time_step, or more stiffness_damping_coefficient, where the body rings",
     }
-
-
-def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:
-    """The renderer; raises OptionError where Drake is not installed."""
-    return made(Drake, model, options)

@@ -17,12 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from palpate.mechanics.model.model import Model
-from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.render.base import Renderer
-from palpate.render.options import BEST, DOCUMENTED, RenderOptions
-from palpate.render.simulators.base import SteppedAdapter, Touch, made
+from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.simulators.base import SteppedAdapter, Touch
 from palpate.render.simulators.tunable import EDGES, Tunable, density
 
 POISSON_LIMIT = 0.45
@@ -200,8 +197,3 @@ class _MujocoTouch:
 
     def force(self) -> np.ndarray:
         return force_on_tip(self._mujoco, self._model, self._data)
-
-
-def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:
-    """The renderer; raises OptionError where MuJoCo is not installed."""
-    return made(MuJoCo, model, options)

@@ -12,11 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.mechanics.model.model import Model
-from palpate.mechanics.progress import Progress, silent
-from palpate.render.base import Renderer
-from palpate.render.options import BEST, DOCUMENTED, RenderOptions
-from palpate.render.simulators.base import ScriptedAdapter, made
+from palpate.render.options import BEST, DOCUMENTED
+from palpate.render.simulators.base import ScriptedAdapter
 from palpate.render.simulators.tunable import EDGES, Tunable, density
 
 POISSON_LIMIT = 0.45
@@ -84,8 +81,3 @@ class Newton(ScriptedAdapter):
         "--simulator-set timestep_s=0.001,sweeps=20",
         "lost_contact": "a larger soft_contact_gap, a smaller step",
     }
-
-
-def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:
-    """The renderer; raises OptionError where Newton is not installed."""
-    return made(Newton, model, options)

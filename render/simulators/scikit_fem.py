@@ -18,11 +18,9 @@ from scipy.sparse.linalg import splu
 from palpate.mechanics.elastic import pardiso
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
-from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
-from palpate.render.base import Renderer
 from palpate.render.options import BEST, DOCUMENTED, RenderOptions
-from palpate.render.simulators.base import Adapter, World, made
+from palpate.render.simulators.base import Adapter, World
 from palpate.render.simulators.tunable import EDGES, Tunable
 
 
@@ -271,8 +269,3 @@ class _ScikitFemTouch:
         touching = deep > 0
         force = spring * deep[:, None] * n + share[:, None] * pull
         return force * touching[:, None], slope * touching[:, None, None]
-
-
-def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:
-    """The renderer; raises OptionError where scikit-fem is not installed."""
-    return made(ScikitFem, model, options)

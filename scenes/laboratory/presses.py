@@ -144,7 +144,7 @@ def press_set(phantom: Phantom, protocol: str, number: int) -> list[PlannedTouch
     extra = rng.permutation(len(points))
     for kind, amount in (("oblique", plan.obliques), ("drag", plan.drags)):
         for k in extra[:amount]:
-            spot = _insert_after(touches, int(k))
+            spot = max(i for i, t in enumerate(touches) if t.site == k) + 1
             visits = sum(t.site == k for t in touches)
             touches.insert(
                 spot, _touch(int(k), points[k], normals[k], kind, min(depths[k], 6.0), rng, visits)
@@ -161,10 +161,6 @@ def press_set(phantom: Phantom, protocol: str, number: int) -> list[PlannedTouch
 
 def _shallower(depth: float, rng: np.random.Generator) -> float:
     return max(1.0, round(depth * rng.uniform(0.65, 1.0) * 4) / 4)
-
-
-def _insert_after(touches: list[PlannedTouch], site: int) -> int:
-    return max(i for i, t in enumerate(touches) if t.site == site) + 1
 
 
 def _touch(

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
-from palpate.importing.mapping import ROLES, Column, Said, time_of
+from palpate.importing.mapping import ROLES, Column, Said, named_columns
 from palpate.importing.meaning import MOST_ODDS, BestReading, clock_of, clock_starts, joined, settled_clock
 from palpate.importing.tables import Table
 from palpate.mechanics.errors import RecordingError
@@ -111,7 +111,7 @@ def _clock_of(table: Table, columns: dict[str, Column], said: Said) -> Column | 
         return found
     if found.name in table.columns:
         return Column("t", table, found.name, found.factor, found.unit, found.guessed)
-    alone = time_of(table, said)
+    alone = named_columns([table], ("t",), said).get("t")
     if alone is None:
         raise RecordingError(
             f"'{table.name}' has no column of time: its rows cannot be matched with the others'"

@@ -246,12 +246,6 @@ def named_columns(tables: Sequence[Table], roles: Sequence[str], said: Said) -> 
     return {r: _column(r, *guess, said, guessed=True) for r, guess in guesses.items() if guess is not None}
 
 
-def time_of(table: Table, said: Said) -> Column | None:
-    """A table's own column of time, by its name."""
-    guess = _guess([table], "t")
-    return None if guess is None else _column("t", *guess, said, guessed=True)
-
-
 def _listed(tables: Sequence[Table]) -> str:
     each = [n for t in tables for n in t.columns]
     names = [f"{t.name}:{n}" if each.count(n) > 1 else n for t in tables for n in t.columns]

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from palpate.diagnosis.forward.touches import LEAST_PRESSES
 from palpate.mechanics.errors import DiagnosisError, OptionError
@@ -273,14 +273,10 @@ def _named(
     except DiagnosisError as error:
         return (), [f"settings were tried in their usual order, as the start gave no diagnosis: {error}"]
     numerics = found_gap.parts["numerics"].names
-    own = [name for name in (*numerics, *found_gap.candidates) if name in _mended_by(adapter)]
+    mended = {name for tunable in adapter.tunables for name in tunable.mends}
+    own = [name for name in (*numerics, *found_gap.candidates) if name in mended]
     said = ", ".join(name.replace("_", " ") for name in own) or "nothing that a setting mends"
     return tuple(own), [f"the diagnosis of the start names {said}: tried first"]
-
-
-def _mended_by(adapter: Any) -> set[str]:
-    """Numerical effects that one of its settings mends."""
-    return {name for tunable in adapter.tunables for name in tunable.mends}
 
 
 def path_of_body(body: ScaledBody, until_s: float = math.inf) -> TruePath:

@@ -11,7 +11,7 @@ from concurrent.futures import CancelledError, Future, InvalidStateError, Thread
 from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import psutil
 
@@ -26,18 +26,6 @@ _AHEAD = 2, 32
 """Jobs that Dask is given at once, so many a thread of its workers and so many more: none of them waits for
 this process, also where they are short."""
 _CONNECT_S, _COUNT_S, _PATIENCE_S = 10.0, 2.0, 900.0
-
-
-class Engine(Protocol):
-    """What does jobs. memory_bytes: what these share, None where it is not ours to count."""
-
-    memory_bytes: int | None
-
-    def slots(self) -> int:
-        """How many it wants to hold, now."""
-
-    def submit(self, job: dict[str, Any], order: int) -> Future[Answer]:
-        """Do a job (`Task.job`); the lower its order, the sooner. It is cancelled where it was lost."""
 
 
 class LocalEngine(AbstractContextManager["LocalEngine"]):
@@ -135,6 +123,12 @@ class DaskEngine(AbstractContextManager["DaskEngine"]):
             return ours
 
 
+Engine = LocalEngine | DaskEngine
+"""What does jobs. memory_bytes: what these share, None where it is not ours to count; slots(): how many it
+wants to hold, now; submit(job, order): a future, cancelled where the job was lost; the lower its order, the
+sooner."""
+
+
 def _hand_on(client: Any, ours: Future[Answer], theirs: Any) -> None:
     """Those of Dask's `client.get_executor` wait for ever where a scheduler goes away while it answers."""
     with contextlib.suppress(InvalidStateError):  # it was lost meanwhile
@@ -151,7 +145,7 @@ def _hand_on(client: Any, ours: Future[Answer], theirs: Any) -> None:
 
 def engine(
     workers: int | None = None, scheduler: str | None = None, memory_bytes: int | None = None
-) -> LocalEngine | DaskEngine:
+) -> Engine:
     """Processes of this machine, or the workers of a Dask scheduler.
 
     Raises OptionError for fewer workers than one, for both at once, and where no scheduler answers.

@@ -24,7 +24,7 @@ from palpate.mechanics.model.model import Model, Support, Tool
 from palpate.mechanics.progress import TimeIsUp
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.options import DOCUMENTED, RenderOptions
-from palpate.render.registry import _SIMULATORS, simulator_names
+from palpate.render.registry import adapter_of, simulator_names
 from palpate.render.simulators.base import Adapter, SimulatorRenderer
 from palpate.render.simulators.tunable import Tunable
 from palpate.scenes.conformance.scaled import scaled_body
@@ -398,10 +398,10 @@ def test_a_body_of_the_kit_has_its_force_at_any_modulus_and_tip():
 
 @pytest.mark.parametrize("name", simulator_names())
 def test_what_may_be_tuned_is_a_setting_within_its_rungs(name):
-    module = import_module(_SIMULATORS[name])
-    for tunable in module.TUNABLES:
+    adapter = adapter_of(name)
+    for tunable in adapter.tunables:
         assert tunable.rungs == tuple(sorted(set(tunable.rungs))) and tunable.term
-        for settings in module.SETTINGS.values():
+        for settings in adapter.settings.values():
             value = getattr(settings, tunable.name)
             assert tunable.rungs[0] <= value <= tunable.rungs[-1] or not tunable.mends
 
@@ -410,9 +410,9 @@ def test_what_may_be_tuned_is_a_setting_within_its_rungs(name):
 def test_settings_are_written_in_that_simulators_own_file(springs, tmp_path, name):
     runs, path = Runs("springs", RenderOptions()), press(springs, 0.002)
     plain = tuned(runs, springs, Judged([path], [path], []), noise_n=10.0, law_n=0.0, within_s=60.0)
-    module = import_module(_SIMULATORS[name])
-    began = {t.name: float(getattr(module.SETTINGS[DOCUMENTED], t.name)) for t in module.TUNABLES}
-    first = module.TUNABLES[0]
+    adapter = adapter_of(name)
+    began = {t.name: float(getattr(adapter.settings[DOCUMENTED], t.name)) for t in adapter.tunables}
+    first = adapter.tunables[0]
     settings = {**began, first.name: first.rungs[1]}
     moved = (Moved(first.name, began[first.name], first.rungs[1], first.term),)
     found = replace(plain, simulator=name, began=began, settings=settings, moved=moved)

@@ -25,9 +25,9 @@ PAGE = Path(__file__).resolve().parents[2] / "CONTRIBUTING.md"
 def bed(monkeypatch: pytest.MonkeyPatch) -> str:
     text = PAGE.read_text(encoding="utf-8")
     found = re.search(r"<!-- listing: render/simulators/bed.py -->\n```python\n(.*?)```", text, re.DOTALL)
-    name, where = re.search(r'^    "(\w+)": "([\w.]+)",$', text, re.MULTILINE).groups()
-    module = ModuleType(where)
-    monkeypatch.setitem(sys.modules, where, module)
+    name, where = re.search(r'^    "(\w+)": "([\w.]+:\w+)",$', text, re.MULTILINE).groups()
+    module = ModuleType(where.partition(":")[0])
+    monkeypatch.setitem(sys.modules, module.__name__, module)
     exec(compile(found[1], str(PAGE), "exec"), module.__dict__)
     monkeypatch.setitem(registry._SIMULATORS, name, where)
     return name

@@ -89,7 +89,8 @@ class Filtered:
     @cached_property
     def touching(self) -> np.ndarray:
         """(n,) bool: where something is touched, on the way or on purpose."""
-        gap = passing_zero(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+        # so long a low-passed force may be near zero and not end: a quarter of its fastest wave
+        gap = round(0.25 * self.signals.recording.sample_rate_hz / self.cutoff_hz)
         contrast = self.signals.magnitude / self.spread
         if self.air is not None:
             contrast = np.where(self.air, 0.0, contrast)
@@ -178,11 +179,6 @@ def _sliding(recording: Recording, position: np.ndarray) -> np.ndarray:
         return np.zeros(len(t), dtype=bool)
     on = in_its_plane(position, (t >= stated[0]) & (t <= stated[1]), recording.tip_radius_m)
     return on & ~on.all()
-
-
-def passing_zero(rate_hz: float, cutoff_hz: float) -> int:
-    """Samples that a low-passed force may be near zero and not end: a quarter of its fastest wave."""
-    return round(0.25 * rate_hz / cutoff_hz)
 
 
 def hysteresis(

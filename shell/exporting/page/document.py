@@ -77,7 +77,7 @@ def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Packed
     sizes = np.repeat(table.channels[:, :, :1].mean(axis=0), table.channels.shape[2], axis=1)
     sizes[:, 4:] /= _SIDEWAYS
     both = np.concatenate([table.channels, table.bend_channels])
-    modes = modes_of(_flat(both), sizes.ravel(), ERROR)
+    modes = modes_of(both.reshape(len(both), -1), sizes.ravel(), ERROR)
     # of a bend: what its middle differs by from the mean of its ends
     modes.weights[len(table.channels) :] -= modes.weights[table.bends].mean(axis=1)
     block.modes("response", modes)
@@ -98,10 +98,6 @@ def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Packed
         "presses": {**presses, "word": press_word(model)},
         "arrays": block.index,
     }
-
-
-def _flat(table: np.ndarray) -> np.ndarray:
-    return table.reshape(len(table), -1)
 
 
 @lru_cache(maxsize=1)
@@ -412,7 +408,7 @@ def _number(value: float) -> str:
 def button(model: Model) -> str:
     """HTML of the button. Where the object's compliance is not kept in its folder yet, which takes a while to
     compute, the button says by which command the page is made instead."""
-    if not _at_hand(model):
+    if model.path is None or not any(model.path.glob("compliance-*.bin")):
         folder = html.escape(typed_word(model.path or "MODEL"))
         return (
             '<p class="press-it">Press it in a browser, by mouse, finger or keyboard: '
@@ -420,7 +416,3 @@ def button(model: Model) -> str:
         )
     page = gzip.compress(page_of(FemRenderer(model)).encode(), 9, mtime=0)
     return file("button.html").replace("{{page}}", base64.b64encode(page).decode()).rstrip("\n")
-
-
-def _at_hand(model: Model) -> bool:
-    return model.path is not None and any(model.path.glob("compliance-*.bin"))
