@@ -26,7 +26,7 @@ from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import Score
 from palpate.diagnosis.search.rivals import Choice, Explanation, Names, of_one_phenomenon, posterior
 from palpate.mechanics.effects.base import Effect, Scope
-from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.progress import Progress, part, silent
 from palpate.render.replay import rms_n
 
 TRIED = 3
@@ -142,9 +142,7 @@ def attribute(
     forward = _Selection(search, effects, seen)
     most = search.options.greatest_number
     for step in range(most):
-        if not forward.step(
-            lambda words, x, step=step: progress(f"effect {step + 1}: {words}", (step + x) / most)
-        ):
+        if not forward.step(part(progress, step / most, (step + 1) / most)):
             break
     steps, current, chosen = forward.steps, forward.current, forward.chosen
     picked = tuple(chosen)[: len(steps)]
@@ -204,7 +202,7 @@ class _Selection:
         for i, effect in enumerate(self.effects):
             if effect.name in there.names or of_one_phenomenon(effect, [*there.effects, *self.effects[:i]]):
                 continue
-            progress(effect.name, i / len(self.effects))
+            progress(f"effect {len(self.steps) + 1}: {effect.name}", i / len(self.effects))
             candidate = self.search.judge([*there.effects, effect], like=self.current)
             if not self.chosen:
                 candidate = _with_hidden_strain(self.search, effect, candidate, self.current)
