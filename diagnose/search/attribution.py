@@ -167,9 +167,8 @@ def attribute(
         first = not chosen
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
-        able = [
-            s for s in scores.values() if search.able(s, first=first) and _own_n(search, s, least) > least
-        ]
+        able = [s for s in scores.values() if search.able(s, first=first)]
+        able = [s for s in able if _size_n(search, s, chosen, least) > least]
         if search.forward.measured and search.sideways_off(current):
             able = _not_blind_to_slip(search, able)
         log_odds: dict[Names, float] = {(s.name,): s.log_odds for s in able}
@@ -216,9 +215,10 @@ def attribute(
     )  # fmt: skip
 
 
-def _own_n(search: Search, score: Score, least: float) -> float:
-    """N rms by which a score's effect changes the force; of a simulator, in the joint fit with all else as it
-    is there: where what was named before has bent to do its work, the prediction hardly moves."""
+def _size_n(search: Search, score: Score, chosen: Sequence[str], least: float) -> float:
+    """N rms by which a score's effect changes the force. Of a simulator it is the effect's own force in the
+    joint fit, all else as it is there, where what is chosen keeps its place beside it: once that had bent to
+    do the other's work too, the prediction hardly moves."""
     if search.forward.measured or score.size_n > least:
         return score.size_n
     found, forward = score.candidate.found, search.forward
@@ -227,7 +227,12 @@ def _own_n(search: Search, score: Score, least: float) -> float:
     both, rest = (
         forward.predict(settings_of(forward, found.effects, v, found.onset)) for v in (found.values, without)
     )
-    return rms_n(np.nan_to_num(both - rest)[forward.touches.counted])
+    own = rms_n(np.nan_to_num(both - rest)[forward.touches.counted])
+    for effect in (e for e in found.effects if e.name in chosen and own > least):
+        others = search.judge([e for e in found.effects if e is not effect], like=score.candidate)
+        if search.score([effect], score.candidate, others).probability <= search.options.doubt:
+            return score.size_n  # instead of it, not beside it
+    return own
 
 
 def _another(score: Score, best: Score) -> bool:
