@@ -16,6 +16,7 @@ import time
 from collections.abc import Callable
 from ctypes import POINTER, byref, c_byte, c_char_p, c_double, c_int, c_ubyte, c_uint
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -81,22 +82,17 @@ class ForceDimensionWire:
     def __init__(self, options: ForceDimensionOptions) -> None:
         self.options = options
         self.spec = SPEC
-        self._loaded: ctypes.CDLL | None = None
-        self._newer: frozenset[str] = frozenset()
         self._id: int | None = None
         self._forcing = False
 
-    @property
+    @cached_property
     def _library(self) -> ctypes.CDLL:
         """The maker's library, loaded when first asked for; raises DeviceError where there is none."""
-        if self._loaded is None:
-            own = self.options.forcedimension_folder
-            folders = (own, *FOLDERS) if own else FOLDERS
-            library = load(("dhd", "drd", "dhd64", "drd64"), folders, INSTALL)
-            need(library, FUNCTIONS)
-            self._newer = offered(library, NEWER_FUNCTIONS)
-            self._loaded = library
-        return self._loaded
+        library = load(
+            ("dhd", "drd", "dhd64", "drd64"), (self.options.forcedimension_folder, *FOLDERS), INSTALL
+        )
+        need(library, FUNCTIONS)
+        return library
 
     def connect(self) -> None:
         """Load the library, open the first device, set its watchdog; force stays off."""
@@ -123,8 +119,8 @@ class ForceDimensionWire:
 
     def _limited(self, spec: DeviceSpec, number: int) -> DeviceSpec:
         """The specification with what the library does to a force."""
-        words, most = [], spec.max_force_n
-        if "dhdGetMaxForce" not in self._newer:
+        words, most, newer = [], spec.max_force_n, offered(self._library, NEWER_FUNCTIONS)
+        if "dhdGetMaxForce" not in newer:
             words.append("the library is too old to report its force limit")
         else:
             limit_n = float(self._library.dhdGetMaxForce(number))
@@ -134,7 +130,7 @@ class ForceDimensionWire:
             if 0.0 < limit_n < most:
                 most = limit_n
                 words.append(f"the library cuts forces at {limit_n:g} N")
-        if "dhdSetGravityCompensation" not in self._newer:
+        if "dhdSetGravityCompensation" not in newer:
             words.append("the library is too old for gravity compensation to be set")
         elif self._library.dhdSetGravityCompensation(1, number) < 0:
             words.append("without gravity compensation: the arm's weight is felt")

@@ -25,6 +25,7 @@ from ctypes import (
     c_void_p,
 )
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -115,8 +116,6 @@ class OpenHapticsWire:
     def __init__(self, options: OpenHapticsOptions) -> None:
         self.options = options
         self.spec = SPEC
-        self._newer: frozenset[str] = frozenset()
-        self._loaded: ctypes.CDLL | None = None
         self._handle: int | None = None
         self._arrived = threading.Event()
         self._reading: Reading | None = None
@@ -124,17 +123,12 @@ class OpenHapticsWire:
         self._order: tuple[float, np.ndarray | None] = (float("-inf"), None)
         self._callback = CALLBACK(self._turn)
 
-    @property
+    @cached_property
     def _library(self) -> ctypes.CDLL:
         """The maker's library, loaded when first asked for; raises DeviceError where there is none."""
-        if self._loaded is None:
-            own = self.options.openhaptics_folder
-            folders = (own, *FOLDERS) if own else FOLDERS
-            library = load(("HD", "hd"), folders, INSTALL)
-            need(library, FUNCTIONS)
-            self._newer = offered(library, NEWER_FUNCTIONS)
-            self._loaded = library
-        return self._loaded
+        library = load(("HD", "hd"), (self.options.openhaptics_folder, *FOLDERS), INSTALL)
+        need(library, FUNCTIONS)
+        return library
 
     def connect(self) -> None:
         """Load the library, initialise the device, start its scheduler; forces are zero."""
@@ -165,7 +159,7 @@ class OpenHapticsWire:
         elif values[0] < most:
             most = float(values[0])
             words.append(f"the driver allows at most {most:g} N")
-        if "hdIsEnabled" in self._newer and library.hdIsEnabled(FORCE_RAMPING):
+        if "hdIsEnabled" in offered(library, NEWER_FUNCTIONS) and library.hdIsEnabled(FORCE_RAMPING):
             library.hdDisable(FORCE_RAMPING)
             words.append("the driver's own ramp of forces is switched off")
         library.hdGetError()

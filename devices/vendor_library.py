@@ -12,11 +12,12 @@ from palpate.mechanics.errors import DeviceError
 
 
 def candidates(stems: Sequence[str], folders: Sequence[str]) -> list[Path]:
-    """Files that could be the library, in order of the folders; a folder may be '$NAME' of an environment."""
+    """Files that could be the library, in order of the folders, of which '' is none; one may be '$NAME' of an
+    environment."""
     found = []
     for folder in folders:
         expanded = os.path.expandvars(os.path.expanduser(folder))
-        if expanded.startswith("$"):
+        if not expanded or expanded.startswith("$"):
             continue
         for base in (Path(expanded), Path(expanded) / "lib"):
             for stem in stems:

@@ -214,7 +214,7 @@ class _Selection:
         search, first = self.search, self.chosen[:1]
         least = search.options.least_of_first * max((self.steps[0][n].size_n for n in first), default=0.0)
         able = [s for s in scores.values() if search.able(s, first=not first)]
-        able = [s for s in able if _own_n(search, s, least) > least]
+        able = [s for s in able if _size_n(search, s, self.chosen, least) > least]
         if search.forward.measured and search.sideways_off(self.current):
             able = _not_blind_to_slip(search, able)
         return able
@@ -258,9 +258,10 @@ class _Selection:
         self.current, self.strain_gain, self.strain_closes = found
 
 
-def _own_n(search: Search, score: Score, least: float) -> float:
-    """N rms by which a score's effect changes the force; of a simulator, in the joint fit with all else as it
-    is there: where what was named before has bent to do its work, the prediction hardly moves."""
+def _size_n(search: Search, score: Score, chosen: Sequence[str], least: float) -> float:
+    """N rms by which a score's effect changes the force. Of a simulator it is the effect's own force in the
+    joint fit, all else as it is there, where what is chosen keeps its place beside it: once that had bent to
+    do the other's work too, the prediction hardly moves."""
     if search.forward.measured or score.size_n > least:
         return score.size_n
     found, forward = score.candidate.found, search.forward
@@ -269,7 +270,12 @@ def _own_n(search: Search, score: Score, least: float) -> float:
     both, rest = (
         forward.predict(settings_of(forward, found.effects, v, found.onset)) for v in (found.values, without)
     )
-    return rms_n(np.nan_to_num(both - rest)[forward.touches.counted])
+    own = rms_n(np.nan_to_num(both - rest)[forward.touches.counted])
+    for effect in (e for e in found.effects if e.name in chosen and own > least):
+        others = search.judge([e for e in found.effects if e is not effect], like=score.candidate)
+        if search.score([effect], score.candidate, others).probability <= search.options.doubt:
+            return score.size_n  # instead of it, not beside it
+    return own
 
 
 def _another(score: Score, best: Score) -> bool:

@@ -179,20 +179,6 @@ class Servo(AbstractContextManager["Servo"]):
             raise PalpateError("only a model's renderer can be switched by name: start with a model")
         self.set_source(self._source.named(name, options), progress)
 
-    def set_model(self, model: Model | Path | str, progress: Progress = silent) -> None:
-        """Go on with another model through the same renderer, with the same options."""
-        folder = ModelFolder(model)
-        try:
-            now = self._source
-            options = now.render_options if isinstance(now, ModelSource) else None
-            self.set_source(ModelSource(folder.path, now.name, options), progress)
-        except PalpateError:
-            folder.close()
-            raise
-        if self._folder is not None:
-            self._folder.close()
-        self._folder = folder
-
     def set_source(self, source: RendererSource, progress: Progress = silent) -> None:
         """Go on with what `source` makes."""
         self._command("source", source, progress)

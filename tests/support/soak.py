@@ -27,6 +27,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.recording.recording import read_recording
 from palpate.servo import Servo, exploring_hand
 from palpate.servo.layout import DEADLINE, LATE, MISSED, STARTED, TICKS
+from palpate.servo.source import ModelSource
 from palpate.window.session import TouchSession
 
 SAMPLES = 120
@@ -244,7 +245,7 @@ def _swaps(models: list[Model], swaps: int) -> dict[str, Any]:
         for k in range(swaps):
             path = models[(k + 1) % len(models)].path
             assert path is not None
-            servo.set_model(path)
+            servo.set_source(ModelSource(path))
             continuity.look()
             if k % max(1, swaps // SAMPLES) == 0:
                 health.sample()
