@@ -25,6 +25,7 @@ T = TypeVar("T")
 DRAGGED_M = 0.006
 DEPTH = "press depth"
 """The slider's name."""
+HERE = "N/m here: how much more force the next metre would take; the map has force over depth"
 
 
 class NextStep:
@@ -35,6 +36,8 @@ class NextStep:
         depth, look = pointer.press_depth_m, orbit.azimuth
         self._began: np.ndarray | None = None
         self._can_stop = session.has_force
+        free = window.game is None and not window.guided
+        self._last = "Press anywhere. Settings changes what you feel." if free else ""
 
         def touching(frame: Frame) -> bool:
             return frame.touching
@@ -46,12 +49,14 @@ class NextStep:
             ("Hold it, and drag: the tip sticks, then slides.", self._dragged),
             ("Hold the right button and move: the view turns.", lambda _: orbit.azimuth != look),
         ]
+        if not free:
+            del steps[2:4]
         if not mouse:
             steps = [("Move the device until the tip touches.", touching)]
-        if not session.beside_name:
+        if free and not session.beside_name:
             both = "Side by side: feel one model, see another."
             steps.append((both, lambda _: bool(session.beside_name)))
-        if window.game is None:
+        if free:
             ball = "Stiff ball puts one under the tip: press there again."
             steps.append((ball, lambda _: session.inclusion is not None))
         self._steps = steps
@@ -65,7 +70,7 @@ class NextStep:
         self._steps = [(words, done) for words, done in self._steps if not done(frame)]
         if self._can_stop and not frame.force_enabled:
             return "The force is off: Space, or Force, switches it on."
-        return self._steps[0][0] if self._steps else "Press anywhere. Settings changes what you feel."
+        return self._steps[0][0] if self._steps else self._last
 
 
 def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
@@ -86,7 +91,7 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
     called, colour = (others[0].name, colour_of(others[0].name)) if others else ("", GREY)
     rows.append((Item(second, size=15, bold=True, colour=colour, tip=called),))
     rows += [
-        (Item(_where(frame), size=12, colour=GREY),),
+        (Item(_where(frame), size=12, colour=GREY, tip=HERE),),
         (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=2),),
     ]
     if window.moved_by_mouse:

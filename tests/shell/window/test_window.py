@@ -363,6 +363,7 @@ def test_enter_while_pressing_keeps_the_answer(driven: Driven, monkeypatch) -> N
     monkeypatch.setattr(driven.window, "game", game)
     press(driven)
     driven.says("It is here")
+    driven.says("Move the mouse", says=False)
     driven.key("Return")
     driven.wait(0.05)
     assert game.answered and len(game.answers) == 1, "the press that goes on begins no round"
@@ -373,6 +374,19 @@ def test_enter_while_pressing_keeps_the_answer(driven: Driven, monkeypatch) -> N
     press(driven)
     assert not game.answered and not seen_through(driven), "the next touch does"
     release(driven)
+
+
+def test_the_button_of_the_answer_means_the_last_press(driven: Driven, monkeypatch) -> None:
+    """The mouse's way to the button leads over the table, and the tip hovers after it."""
+    game = Game([NODULE], UP)
+    monkeypatch.setattr(driven.window, "game", game)
+    pressed = press(driven).tip_m
+    release(driven)
+    driven.mouse(0.01, 0.3)
+    driven.rests()
+    driven.click("It is here")
+    assert game.answers[0].off_m == pytest.approx(np.hypot(*(pressed - NODULE.centre_m)[:2]), abs=1e-3)
+    driven.frame()
 
 
 def test_everything_stands_beside_everything_else(driven: Driven) -> None:
