@@ -92,7 +92,7 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
     rows.append((Item(second, size=15, bold=True, colour=colour, tip=called),))
     rows += [
         (Item(_where(frame), size=12, colour=GREY, tip=HERE),),
-        (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=2),),
+        (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=6 if window.game else 2),),
     ]
     if window.moved_by_mouse:
         rows += depth_rows(window)

@@ -28,6 +28,7 @@ from palpate.render.base import Renderer
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.force_error import modulus_share, place_numbers, rendered_share
 from palpate.render.registry import create
+from palpate.show.light import lit
 
 ONE_D = "hunt-crossley"
 ERROR = 0.003
@@ -47,7 +48,10 @@ def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Packed
     block = PackedArrays()
     block.between("vertices", arrays.vertices)
     block.around("normals", arrays.normals)
-    block.whole("triangles", arrays.triangles)
+    seen = lit(arrays.vertices, arrays.triangles, arrays.free > 0)
+    block.whole("seen_at", seen.at)
+    block.whole("seen_triangles", seen.triangles)
+    block.around("seen_normals", seen.normals)
     block.whole("free", arrays.free)
     progress("page: forces", 0.1)
     table = responses(renderer, depths)
