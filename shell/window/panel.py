@@ -44,7 +44,7 @@ class NextStep:
 
         steps: list[tuple[str, Callable[[Frame], bool]]] = [
             ("Move the mouse over the object.", lambda _: pointer.target is not None),
-            ("Hold the left button: the tip presses in.", touching),
+            ("Hold the left button: the tip presses in.", _pushed),
             ("Hold it, and turn the wheel: deeper, or less deep.", lambda _: pointer.press_depth_m != depth),
             ("Hold it, and drag: the tip sticks, then slides.", self._dragged),
             ("Hold the right button and move: the view turns.", lambda _: orbit.azimuth != look),
@@ -102,7 +102,12 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
 def _where(frame: Frame) -> str:
     if frame.touching:
         return f"{mm(frame.depth_m, '.1f')} deep, {frame.stiffness_n_per_m:.0f} N/m here"
-    return "on the support" if any(np.linalg.norm(v.force_n) > 0.0 for v in frame.views) else "in air"
+    return "on the support" if _pushed(frame) else "in air"
+
+
+def _pushed(frame: Frame) -> bool:
+    """Whether the tip is on something, the object or its support."""
+    return any(np.linalg.norm(view.force_n) > 0.0 for view in frame.views)
 
 
 def depth_rows(window: TouchWindow) -> list[Row]:

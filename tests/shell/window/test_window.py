@@ -24,14 +24,14 @@ from palpate.show.colours import COLOURS
 from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
 from palpate.window.keys import KEYS
-from palpate.window.panel import DEPTH
+from palpate.window.panel import DEPTH, NextStep
 from palpate.window.session import SessionOptions
 from palpate.window.widgets import BODY, fitted
 from palpate.window.widgets import SIZE as FULL
 from palpate.window.window import COLUMN, TouchWindow
 
 from ...support.waiting import PATIENCE_S, eventually
-from .driven import Driven, driving
+from .driven import HALF, Driven, driving
 
 SIZE = (640, 480)
 NODULE, UP = Ball((0.0, 0.0, 0.02), 0.005, 8.0), np.array([0.0, 0.0, 1.0])
@@ -387,6 +387,17 @@ def test_the_button_of_the_answer_means_the_last_press(driven: Driven, monkeypat
     driven.click("It is here")
     assert game.answers[0].off_m == pytest.approx(np.hypot(*(pressed - NODULE.centre_m)[:2]), abs=1e-3)
     driven.frame()
+
+
+def test_a_button_that_is_held_on_the_support_is_asked_for_no_more(driven: Driven) -> None:
+    """Along the whole foot, which is traced with it, it was."""
+    said = NextStep(driven.window, mouse=True)
+    driven.mouse_at(np.array([0.0, -HALF - 0.02, 0.0]))
+    driven.rests()
+    driven.button(True)
+    leaning = driven.until(lambda frame: not frame.touching and any(sizes(frame)))
+    assert "left button" not in said.line(leaning)
+    release(driven)
 
 
 def test_everything_stands_beside_everything_else(driven: Driven) -> None:
