@@ -1,5 +1,5 @@
 """Make the pictures of pages and of comparisons in `docs/images`, by a browser: `page-demo`, `page-phone`,
-`page-diagnosis`, `press`, `compare-by-press`, `compare-left-out-foot`.
+`page-diagnosis`, `press`, `press-NAME` of each page of the site, `compare-by-press`, `compare-left-out-foot`.
 
 The demo and the comparison are of the embedded cylinder. The diagnosis is of `palpate simulate block -o
 gel.csv.gz --effect viscoelasticity=1 --seed 3 --no-sizes`; the phone shows its page too, in the dark.
@@ -28,6 +28,14 @@ FOLDER = Path(__file__).parent.parent / "docs" / "images"
 REGION = "base-band"
 PRESS, DEPTH_M = 13, 0.006
 """Which press's place of the demo's is pressed on the page, counted from 1, and how deep."""
+CARD = 520, 400
+"""Pixels of a picture that leads to a page of the site: the object, and the force."""
+CARD_STYLE = ".view {position: fixed; inset: 0; height: 100vh; z-index: 9} .view p {display: none}"
+ON_CARD = {
+    "demo": (0.03, -0.03, 0.05), "silicone-2": (0.02, -0.06, 0.02), "silicone-3": (0.0, -0.03, 0.05),
+    "bean": (0.0, -0.03, 0.03), "nodule": (0.014, 0.012, 0.05),
+}  # fmt: skip
+"""About where each is pressed, m."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Write the six; nothing to tell of them."""
+    """Write them; nothing to tell of them."""
     folder: Path = arguments.folder
     compared = pp.compare("silicone-1-cylinder", progress=False)
     _write(folder / "compare-by-press.png", drawn(draw, compared, 8, 3.2, layout=None))
@@ -54,7 +62,21 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         tab.evaluate("document.querySelector('.view3d').scrollIntoView()")
         tab.picture(folder / "page-phone.png")
         pressed(tab, Path(work), folder / "press.png")
+        for name in ON_CARD:
+            card(tab, Path(work), name, folder / f"press-{name}.png")
     return {}
+
+
+def card(tab: Tab, work: Path, name: str, picture: Path) -> None:
+    """The picture that leads to the page of a scene: the object alone, under the tip."""
+    export(name, to="page", path=work / f"{name}.html")
+    tab.open(work / f"{name}.html", *CARD)
+    tab.wait("window.palpate !== undefined")
+    tab.evaluate(f"document.head.appendChild(document.createElement('style')).textContent = '{CARD_STYLE}'")
+    tab.evaluate(f"palpate.page.setDepth({DEPTH_M}); palpate.page.pressInSight({list(ON_CARD[name])})")
+    tab.wait("document.getElementById('parts').textContent.includes('deep')")
+    tab.evaluate("new Promise((drawn) => setTimeout(drawn, 1000))")
+    tab.picture(picture)
 
 
 def pressed(tab: Tab, work: Path, picture: Path) -> None:

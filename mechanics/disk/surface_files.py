@@ -9,6 +9,7 @@ Meshes in Gmsh's first format ($NOD, $ELM), which libraries read no more.
 from __future__ import annotations
 
 import logging
+import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from palpate.mechanics.disk.mesh_parts import Part, bodies, labels, without_spec
 from palpate.mechanics.disk.overheard import overheard
 from palpate.mechanics.disk.reading import bounded_memory, no_file
 from palpate.mechanics.disk.vtk_files import read_vtk
-from palpate.mechanics.errors import NotClosedError, SurfaceError
+from palpate.mechanics.errors import NotClosedError, PalpateWarning, SurfaceError
 from palpate.mechanics.extras import install_words
 from palpate.mechanics.quantities import parse_unit
 
@@ -92,6 +93,8 @@ _FLAT = 1e-4
 """Angle, rad, below which neighbours are one flat face."""
 LEAST_M, GREATEST_M = 0.002, 2.0
 """An object that a hand explores is so large across."""
+USUAL_M = 0.01, 0.5
+"""Most are."""
 
 
 @dataclass(frozen=True)
@@ -336,10 +339,12 @@ def _outline(edges: np.ndarray) -> frozenset[tuple[int, int]]:
 
 
 def _check_size(name: str, size: float, unit: str) -> None:
-    if LEAST_M <= size * UNITS[unit] <= GREATEST_M:
-        return
-    fits = [name for name, metres in UNITS.items() if 0.01 <= size * metres <= 0.5]
+    """Refuse a size that no object has; warn, before a mesh is made, of one that another unit makes usual."""
+    least, greatest = USUAL_M
+    fits = [name for name, metres in UNITS.items() if least <= size * metres <= greatest]
     hint = f"these look like {' or '.join(fits)}: give --unit {fits[0]}" if fits else "mend its scale"
-    raise SurfaceError(
-        f"'{name}' is {size:.4g} {unit} across; {LEAST_M:g} to {GREATEST_M:g} m are allowed: {hint}"
-    )
+    across = f"'{name}' is {size:.4g} {unit} across"
+    if not LEAST_M <= size * UNITS[unit] <= GREATEST_M:
+        raise SurfaceError(f"{across}; {LEAST_M:g} to {GREATEST_M:g} m are allowed: {hint}")
+    if fits and unit not in fits:
+        warnings.warn(f"{across}, {size * UNITS[unit]:.2g} m: {hint}", PalpateWarning, stacklevel=4)

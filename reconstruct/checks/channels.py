@@ -21,6 +21,10 @@ _WINDOW_S, _LEAST_WINDOW = 0.25, 10
 _STUCK_S = 1.5
 _MOST_STUCK = 0.25  # of touches or time: a wide play holds a reading still for some presses
 _MOVED, _FELT = 10.0, 30.0
+_STILL_M = 1e-5
+"""A tip that is no farther from where it stood stands there still, or again."""
+_NOISY = 1e-5
+"""Of the greatest force: a sensor's noise is more; without any, a peak is flat to the last digit written."""
 _COARSE = 0.05
 _SPIKE_S, _SPIKES, _AROUND_S, _LEAST_SPIKES = 0.006, 12.0, 0.04, 5
 _STEEP = 0.6
@@ -174,11 +178,13 @@ def _limited(data: Samples) -> Iterator[Finding]:
             continue
         at = tops > top - width
         share = float(width / (0.5 * top))
-        decades = decades_of_tail(int(at.sum()) - 1, int(high.sum()) - 1, share)
+        peaks = [a + int(values[a:b].argmax()) for a, b in spans]
+        apart = _places(data.position[[peak for peak, limit in zip(peaks, at, strict=True) if limit]])
+        decades = decades_of_tail(apart - 1, int(high.sum()) - 1, share)
         # within one touch a limit is read again and again, exactly, where noise would never repeat it
         a, b = spans[int(np.argmax(tops))]
-        same = int((values[a:b] == tops.max()).sum())
-        if not step and same > 3:
+        same = _places(data.position[a:b][values[a:b] == tops.max()])
+        if not step and data.noise_n > _NOISY * top and same > 3:
             decades = max(decades, 2.0 * same)
         if sure(decades) and (worst is None or decades > worst[0]):
             worst = (
@@ -205,6 +211,12 @@ def _limited(data: Samples) -> Iterator[Finding]:
         (float(data.recording.t[a]), float(data.recording.t[b - 1])),
         names,
     )
+
+
+def _places(position: np.ndarray) -> int:
+    """At how many places, each of its own, the tip stood in samples (n, 3) m: at one and the same an object
+    gives the same force."""
+    return len(np.unique(np.rint(position / _STILL_M), axis=0))
 
 
 def _coarse(data: Samples) -> Iterator[Finding]:

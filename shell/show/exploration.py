@@ -28,8 +28,8 @@ def story(result: Explored) -> say.Story:
     name = Path(result.path).name.split(".")[0] or "an object"
     yield say.Title(f"Exploration of {name}", suffixed=True)
     state, recording = result.state, file_words(result.path, "REC")
-    how = f"{'ended' if result.last.kind == 'stop' else 'not ended, next'}: {result.last.why}"
-    made = f"{state.made} presses in {state.seconds:.0f} s"
+    how = f"{'ended' if result.last.kind == 'stop' else 'has not ended, next'}: {result.last.why}"
+    made = f"{state.made} press{'es' * (state.made != 1)} in {state.seconds:.0f} s"
     yield say.Headline(f"{made}: {state.words or 'nothing is known yet'}", on=say.TEXT)
     yield say.Headline(f"{made}: {state.reached or 'nothing is known yet'}", on=say.PAGE)
     yield say.Detail(how, on=say.TEXT)
@@ -41,10 +41,8 @@ def story(result: Explored) -> say.Story:
         yield say.Sentence(f"The last touch could not be used: {state.trouble}", on=say.PAGE)
     more = f" --most {2 * state.made}" if result.last.kind == "stop" else ""
     go_on = f"go on: the same command with `--continue {recording}{more}`"
-    yield say.Next([
-        f"make a model of it: `palpate reconstruct {recording} -o MODEL`",
-        *([] if state.done else [go_on]),
-    ])  # fmt: skip
+    model = f"make a model of it: `palpate reconstruct {recording} -o MODEL`"
+    yield say.Next([*([model] if soft else []), *([] if state.done else [go_on])])
     yield say.Rows(
         ["goal", "now", "wanted", "reached"],
         [[_NAMES[g.name], _goal(g.name, g.now), _goal(g.name, g.goal), _REACHED[g.met]] for g in state.goals],

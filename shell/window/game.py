@@ -16,6 +16,8 @@ from palpate.scenes.scene import FIND_M
 from palpate.words import mm, renderer_words
 
 HALF_TIME_S = 60.0
+PRESSED = 0.9
+"""Share of a press's depth from which the tip is where it pressed, and no longer on its way in or out."""
 PRESS_M = FIND_M
 """How deep a press goes at first."""
 
@@ -38,6 +40,8 @@ class Game:
         self.answers: list[Guess] = []
         self._up = np.asarray(up, dtype=float)
         self._started_s: float | None = None
+        self._deepest_m = 0.0
+        self._place_m = np.zeros(3)
         self._touching = False
 
     @property
@@ -45,36 +49,44 @@ class Game:
         """Whether the nodule may be seen; the next touch, from the air, begins the next round."""
         return bool(self.answers) and self._started_s is None
 
-    def follow(self, touching: bool, now_s: float) -> None:
-        """At every picture: a touch that begins starts the clock, where it does not run."""
-        if touching and not self._touching and self._started_s is None:
-            self._started_s = now_s
+    def follow(self, depth_m: float, tip_m: np.ndarray, now_s: float) -> None:
+        """At every picture: how deep in the object the tip is, 0 in air, and where, (3,) m.
+
+        A touch that begins starts the clock, where it does not run.
+        """
+        touching = depth_m > 0.0
+        if touching and not self._touching:
+            self._deepest_m = 0.0
+            self._started_s = now_s if self._started_s is None else self._started_s
+        if depth_m > PRESSED * self._deepest_m:
+            self._place_m = np.array(tip_m, dtype=float)
+        self._deepest_m = max(self._deepest_m, depth_m)
         self._touching = touching
 
     def seconds(self, now_s: float) -> float:
         """Since this round's first touch."""
         return 0.0 if self._started_s is None else now_s - self._started_s
 
-    def answer(self, point_m: np.ndarray, now_s: float, renderer: str) -> Guess | None:
-        """The nodule is under `point_m` (3,); None where nothing was touched in this round."""
+    def answer(self, now_s: float, renderer: str) -> Guess | None:
+        """The nodule is where the tip pressed last; None where nothing was touched in this round."""
         if self._started_s is None:
             return None
         seconds, self._started_s = now_s - self._started_s, None
-        offs = [self._off(point_m, ball) for ball in self.hidden]
+        offs = [self._off(self._place_m, ball) for ball in self.hidden]
         nearest = int(np.argmin(offs))
         halvings = offs[nearest] / self.hidden[nearest].radius_m + seconds / HALF_TIME_S
         self.answers.append(Guess(renderer, offs[nearest], seconds, 100.0 * 0.5**halvings))
         return self.answers[-1]
 
     def _off(self, point_m: np.ndarray, ball: Ball) -> float:
-        away = np.asarray(point_m) - ball.centre_m
+        away = point_m - ball.centre_m
         return float(np.linalg.norm(away - (away @ self._up) * self._up))
 
     def lines(self, now_s: float) -> list[str]:
         """For the panel: what to do, the last round, and the mean score of each renderer."""
         if self._started_s is not None:
-            deep, ran = mm(PRESS_M, "g"), f"{self.seconds(now_s):.0f} s"
-            first = f"Press {deep} deep at many places. Point at the most N/m, then Enter. {ran}"
+            ran = f"{self.seconds(now_s):.0f} s so far."
+            first = f"Compare the N/m above. Press last where they are most, then click 'It is here'. {ran}"
         elif self.answers:
             last = self.answers[-1]
             first = (
@@ -84,7 +96,7 @@ class Game:
             )
         else:
             deep = mm(PRESS_M, "g")
-            first = f"A nodule is hidden: press {deep} deep at many places, and compare the N/m above."
+            first = f"A nodule is hidden: press {deep} deep at many places of the upper half."
         names = sorted({a.renderer for a in self.answers})
         scores = [
             f"{renderer_words(name)} "

@@ -106,12 +106,13 @@ class Guide:
         self.suggestion: Suggestion = explorer.suggest()
         self.state: ExplorationState = explorer.state
         self.touched = np.zeros((0, 3))
+        self._taken = self._thought = 0
 
     @property
     def ghost(self) -> Ghost | None:
         """The press that is suggested; None where it is something else, or where one is being thought of."""
         s = self.suggestion
-        if s.kind != "press" or s.point is None or s.normal is None:
+        if self._thinking or s.kind != "press" or s.point is None or s.normal is None:
             return None
         return Ghost(s.point + self._servo.tip_radius_m * s.normal, -s.normal, s.depth_m)
 
@@ -153,9 +154,22 @@ class Guide:
         """Whether the base was not all gone round yet, or not so that it was understood."""
         return self.suggestion.kind in ("trace", "retrace")
 
+    @property
+    def _thinking(self) -> bool:
+        """Whether something was taken in, and the suggestion is still the one of before."""
+        return self._thought < self._taken
+
     def _take_in(self) -> None:
         rows, self._rows = np.concatenate(self._rows), []
-        self._worker.run("thinking of the next touch", lambda: self._think(rows))
+        self._taken += 1
+
+        def job() -> None:
+            try:
+                self._think(rows)
+            finally:
+                self._thought += 1
+
+        self._worker.run("thinking of the next touch", job)
 
     def _think(self, rows: np.ndarray) -> None:
         """Take samples in, as what was asked for once all before them were taken in."""
@@ -203,6 +217,8 @@ class Guide:
         what = WHAT.get(s.kind, "")
         if self._still_tracing:
             what += f" ({100 * self._tracing.share:.0f} % traced): the red part is missing"
-        if s.kind == "press":
+        if self._thinking:
+            what = "wait: the next touch is being thought of"
+        elif s.kind == "press":
             what = f"press at the green ghost, {mm(s.depth_m, '.0f')} deep"
         return [what, known]

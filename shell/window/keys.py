@@ -31,7 +31,7 @@ class KeyBinding:
 
 
 KEYS: dict[str, KeyBinding] = {
-    "Return": KeyBinding("The nodule is where the tip is", "It is here", "Touch"),
+    "Return": KeyBinding("The nodule is where you pressed last", "It is here", "Touch"),
     "b": KeyBinding(
         "Show a second renderer under the same tip, or only what you feel", "Side by side", "Touch"
     ),

@@ -25,6 +25,7 @@ T = TypeVar("T")
 DRAGGED_M = 0.006
 DEPTH = "press depth"
 """The slider's name."""
+HERE = "N/m here: how much more force the next metre would take; the map has force over depth"
 
 
 class NextStep:
@@ -35,23 +36,27 @@ class NextStep:
         depth, look = pointer.press_depth_m, orbit.azimuth
         self._began: np.ndarray | None = None
         self._can_stop = session.has_force
+        free = window.game is None and not window.guided
+        self._last = "Press anywhere. Settings changes what you feel." if free else ""
 
         def touching(frame: Frame) -> bool:
             return frame.touching
 
         steps: list[tuple[str, Callable[[Frame], bool]]] = [
             ("Move the mouse over the object.", lambda _: pointer.target is not None),
-            ("Hold the left button: the tip presses in.", touching),
+            ("Hold the left button: the tip presses in.", _pushed),
             ("Hold it, and turn the wheel: deeper, or less deep.", lambda _: pointer.press_depth_m != depth),
             ("Hold it, and drag: the tip sticks, then slides.", self._dragged),
             ("Hold the right button and move: the view turns.", lambda _: orbit.azimuth != look),
         ]
+        if not free:
+            del steps[2:4]
         if not mouse:
             steps = [("Move the device until the tip touches.", touching)]
-        if not session.beside_name:
+        if free and not session.beside_name:
             both = "Side by side: feel one model, see another."
             steps.append((both, lambda _: bool(session.beside_name)))
-        if window.game is None:
+        if free:
             ball = "Stiff ball puts one under the tip: press there again."
             steps.append((ball, lambda _: session.inclusion is not None))
         self._steps = steps
@@ -65,7 +70,7 @@ class NextStep:
         self._steps = [(words, done) for words, done in self._steps if not done(frame)]
         if self._can_stop and not frame.force_enabled:
             return "The force is off: Space, or Force, switches it on."
-        return self._steps[0][0] if self._steps else "Press anywhere. Settings changes what you feel."
+        return self._steps[0][0] if self._steps else self._last
 
 
 def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
@@ -86,8 +91,8 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
     called, colour = (others[0].name, colour_of(others[0].name)) if others else ("", GREY)
     rows.append((Item(second, size=15, bold=True, colour=colour, tip=called),))
     rows += [
-        (Item(_where(frame), size=12, colour=GREY),),
-        (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=2),),
+        (Item(_where(frame), size=12, colour=GREY, tip=HERE),),
+        (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=6 if window.game else 2),),
     ]
     if window.moved_by_mouse:
         rows += depth_rows(window)
@@ -97,7 +102,12 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
 def _where(frame: Frame) -> str:
     if frame.touching:
         return f"{mm(frame.depth_m, '.1f')} deep, {frame.stiffness_n_per_m:.0f} N/m here"
-    return "on the support" if any(np.linalg.norm(v.force_n) > 0.0 for v in frame.views) else "in air"
+    return "on the support" if _pushed(frame) else "in air"
+
+
+def _pushed(frame: Frame) -> bool:
+    """Whether the tip is on something, the object or its support."""
+    return any(np.linalg.norm(view.force_n) > 0.0 for view in frame.views)
 
 
 def depth_rows(window: TouchWindow) -> list[Row]:

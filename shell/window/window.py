@@ -76,7 +76,7 @@ class TouchWindow:
         nodules = tuple(session.model.material.inclusions.values())
         up = session.model.support.normal
         self.game = Game(nodules, up) if scene.find and nodules and guide is None else None
-        self.coloured = scene.colour == "stiffness"
+        self.coloured = scene.colour == "stiffness" and guide is None
         self.plotter = self._plotter(off_screen, size)
         self._first, self._second, self._plots, self._column, self._aside = self.plotter.renderers
         self.boards = [Board(self._column, fill=PAPER), Board(self._aside, fill=PAPER)]
@@ -222,10 +222,8 @@ class TouchWindow:
         self.aside = "" if which == self.aside else which
 
     def answer(self) -> None:
-        """The game's: the nodule is where the mouse points; it is shown until the next touch."""
-        target = self.pointer.target
-        point = self.pointer.tip_m if target is None else target.point
-        if self.game is not None and self.game.answer(point, time.perf_counter(), self.session.renderer_name):
+        """The game's: the nodule is where the tip pressed last; it is shown until the next touch."""
+        if self.game is not None and self.game.answer(time.perf_counter(), self.session.renderer_name):
             self._map.forget()
 
     def _play(self, frame: Frame) -> None:
@@ -233,7 +231,7 @@ class TouchWindow:
         if self.game is None:
             return
         answered = self.game.answered
-        self.game.follow(frame.touching, time.perf_counter())
+        self.game.follow(frame.depth_m, frame.tip_m, time.perf_counter())
         if answered and not self.game.answered and self.coloured:
             for picture in self.pictures:
                 picture.colour_by_displacement()
@@ -301,12 +299,14 @@ class TouchWindow:
             board.show([(Item(f"{begun(renderer_words(name))}: {what}", bold=True),)])
 
     def next_words(self, frame: Frame) -> str:
-        """What to do next: one thing at a time."""
-        if self.guide is not None and self.guide.suggestion.kind != "stop":
-            return sentence(self.guide.lines()[0])
-        if self.game is not None:
-            return "\n".join(self.game.lines(time.perf_counter()))
-        return self._next.line(frame) if self.guide is None else sentence(self.guide.lines()[0])
+        """What to do next: one thing at a time, and under it, until it was done, how."""
+        lines, how = [], self._next.line(frame)
+        stopped = self.guide is not None and self.guide.suggestion.kind == "stop"
+        if self.game is not None and (self.guide is None or stopped):
+            lines = self.game.lines(time.perf_counter())
+        elif self.guide is not None:
+            lines = [sentence(self.guide.lines()[0])]
+        return "\n".join(filter(None, [*lines, "" if stopped else how]))
 
     @property
     def known_words(self) -> str:

@@ -16,7 +16,7 @@ import trimesh
 from pyvista import examples
 
 from palpate.mechanics.disk.surface_files import UNITS, ClosedSurface, read_surface
-from palpate.mechanics.errors import SurfaceError
+from palpate.mechanics.errors import PalpateWarning, SurfaceError
 from palpate.mechanics.shape.flat_foot import PointFoot, TiltedFoot, direction, standing
 from palpate.mechanics.shape.tetmesh import box_mesh
 
@@ -53,6 +53,16 @@ def test_every_format_holds_the_same_solid(tmp_path, suffix):
     surface = read_surface(written(tmp_path, f"block.{suffix}"), "mm")
     assert volume(surface) == pytest.approx(60 * 50 * 40 * 1e-9, rel=1e-6)
     assert surface.size_m == pytest.approx(0.06)
+
+
+def test_a_size_that_no_hand_explores_is_said_with_the_unit_that_fits(tmp_path):
+    """150 mm taken for cm was meshed for minutes before anything was said."""
+    trimesh.creation.box(extents=(150, 110, 60)).export(path := tmp_path / "liver.stl")
+    with pytest.warns(PalpateWarning, match="1.5 m: these look like mm: give --unit mm"):
+        read_surface(path, "cm")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", PalpateWarning)
+        read_surface(path, "mm")
 
 
 def test_a_quadratic_mesh_keeps_its_corners(tmp_path):

@@ -91,6 +91,22 @@ def test_what_is_less_than_a_step_off_a_straight_line_is_no_spike_and_more_is(cy
         assert any(f.name == "spikes" for f in found) is spikes
 
 
+def test_a_press_made_twice_by_a_hand_without_noise_is_no_limit_of_the_sensor():
+    """A mouse that comes back to a place presses there to the same micronewton, and holds it still."""
+    recording, _ = explore_cylinder(noise=0.0)
+    force, spans = np.round(recording.force_on_tool, 6), Samples(recording).spans
+    first, last = max(spans, key=lambda span: np.linalg.norm(force[slice(*span)], axis=1).max())
+    again = np.r_[np.arange(len(force)), np.arange(first - 100, last + 100)]
+    twice = dataclasses.replace(
+        recording,
+        t=np.arange(len(again)) / recording.sample_rate_hz,
+        position=recording.position[again],
+        force_on_tool=force[again],
+    )
+    assert "clipped" not in {finding.name for finding in check(twice)}
+    assert "clipped" in {finding.name for finding in check(FAULTS["saturated at 0.3 N"].change(twice, None))}
+
+
 def test_a_hand_that_held_still_along_one_axis_is_no_stuck_channel(cylinder):
     recording = cylinder[0]
     position = np.array(recording.position)

@@ -45,6 +45,7 @@ from palpate.render.press import Stroke, press
 from palpate.render.registry import create
 from palpate.render.scene import TouchScene, in_the_air
 from palpate.show.colours import style_sheet
+from palpate.show.light import lit
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
 from palpate.words import kpa, mm, renderer_words, typed_word
 
@@ -70,7 +71,10 @@ def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Packed
     block = PackedArrays()
     block.between("vertices", arrays.vertices)
     block.around("normals", arrays.normals)
-    block.whole("triangles", arrays.triangles)
+    seen = lit(arrays.vertices, arrays.triangles, arrays.free > 0)
+    block.whole("seen_at", seen.at)
+    block.whole("seen_triangles", seen.triangles)
+    block.around("seen_normals", seen.normals)
     block.whole("free", arrays.free)
     progress("page: forces", 0.1)
     table = responses(renderer, depths)

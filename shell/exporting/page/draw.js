@@ -87,12 +87,12 @@ class Drawing {
     this.buffers = {};
     this.whole = gl.createVertexArray();
     gl.bindVertexArray(this.whole);
-    this.attribute(this.object, "point", this.shape.points, 3, gl.DYNAMIC_DRAW);
+    this.attribute(this.object, "point", this.shape.drawn, 3, gl.DYNAMIC_DRAW);
     this.attribute(this.object, "normal", this.shape.normals, 3, gl.DYNAMIC_DRAW);
-    this.attribute(this.object, "rest", Float32Array.from(surface.vertices), 3, gl.STATIC_DRAW);
-    this.attribute(this.object, "value", new Float32Array(surface.vertices.length / 3), 1, gl.DYNAMIC_DRAW);
+    this.attribute(this.object, "rest", this.shape.seen(surface.vertices), 3, gl.STATIC_DRAW);
+    this.attribute(this.object, "value", new Float32Array(this.shape.at.length), 1, gl.DYNAMIC_DRAW);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, Uint32Array.from(surface.triangles), gl.STATIC_DRAW);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.shape.triangles, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
     this.parts = { beads: this.beads(0.0010), ball: this.mesh(...ballMesh()), rod: this.mesh(...rodMesh(0.5, 0.5)), cone: this.mesh(...rodMesh(1, 0)), disc: this.mesh(...discMesh()) };
     gl.enable(gl.DEPTH_TEST);
@@ -159,13 +159,13 @@ class Drawing {
     this.values = values;
     if (!values) return;
     this.gl.bindBuffer(this.gl.ARRAY_BUFFER, this.buffers.value);
-    this.gl.bufferSubData(this.gl.ARRAY_BUFFER, 0, values);
+    this.gl.bufferSubData(this.gl.ARRAY_BUFFER, 0, Float32Array.from(this.shape.at, (v) => values[v]));
   }
 
   upload() {
     const { gl } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.point);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.shape.points);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.shape.drawn);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.normal);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, this.shape.normals);
   }
@@ -211,7 +211,7 @@ class Drawing {
       colour: linear(colours.object), low: linear(colours.low), middle: linear(colours.middle), high: linear(colours.high),
     });
     gl.bindVertexArray(this.whole);
-    gl.drawElements(gl.TRIANGLES, this.surface.triangles.length, gl.UNSIGNED_INT, 0);
+    gl.drawElements(gl.TRIANGLES, this.shape.triangles.length, gl.UNSIGNED_INT, 0);
     part(this.parts.beads, WHERE_IT_IS, [...linear(colours.touch), 1]);
     const chosen = this.dots[scene.chosen];
     if (chosen) part(this.parts.ball, standing(chosen, up, 0.0018, 0.0018), [...linear(colours.chosen), 1]);

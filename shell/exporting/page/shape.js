@@ -2,8 +2,8 @@
 // tip a dent is drawn that clears the ball, as render/base.py draws it. Drawing alone: no force comes from here.
 
 class Shape {
-  constructor(surface, read, about) {
-    this.surface = surface;
+  constructor(surface, read, about, at, triangles) {
+    Object.assign(this, { surface, at, triangles });
     this.modes = read("far");
     this.nodes = read("nodes", Uint32Array);
     this.weights = read("node_weights");
@@ -14,9 +14,10 @@ class Shape {
     this.corners = Math.max(this.corners, rows / 3 + 1); // the last one is the base, which does not move
     this.moved = new Float32Array(3 * this.corners);
     this.points = Float32Array.from(surface.vertices);
-    // what is drawn is as smooth as what is felt: the contact normals, turned as the facets turn
-    this.facets = Float32Array.from(this.normalsOf(this.points));
-    this.rest = this.normalsAtRest();
+    this.drawn = this.seen(this.points);
+    // by what show/light.py lights it: smooth but for creases, and turned as the facets turn
+    this.facets = Float32Array.from(this.normalsOf(this.drawn));
+    this.rest = read("seen_normals");
     this.normals = Float32Array.from(this.rest);
     this.still = true;
   }
@@ -25,7 +26,7 @@ class Shape {
   update(touch) {
     if (!touch.touching) {
       if (this.still) return false;
-      this.points.set(this.surface.vertices);
+      this.seen(this.surface.vertices, this.drawn);
       this.normals.set(this.rest);
       this.still = true;
       return true;
@@ -33,7 +34,7 @@ class Shape {
     this.still = false;
     this.far(touch);
     this.dent(touch);
-    const now = this.normalsOf(this.points);
+    const now = this.normalsOf(this.seen(this.points, this.drawn));
     for (let i = 0; i < now.length; i++) this.normals[i] = this.rest[i] + now[i] - this.facets[i];
     return true;
   }
@@ -90,23 +91,22 @@ class Shape {
     }
   }
 
-  // The contact normals; at the rim of the base, where those lean under the object, the normals of its side.
-  normalsAtRest() {
-    const { triangles, free, normals } = this.surface, out = Float32Array.from(normals);
-    triangles.forEach((v, i) => {
-      if (!free[Math.floor(i / 3)]) out.set(this.facets.subarray(3 * v, 3 * v + 3), 3 * v);
+  // What is drawn of rows of three numbers a vertex, each once on either side of a crease.
+  seen(rows, out = new Float32Array(3 * this.at.length)) {
+    this.at.forEach((v, i) => {
+      for (let k = 0; k < 3; k++) out[3 * i + k] = rows[3 * v + k];
     });
     return out;
   }
 
-  // Unit normals of the facets around each vertex; those of the base count where there are no others.
+  // Unit normals of the facets around each point that is drawn.
   normalsOf(p) {
-    const { triangles: t, free } = this.surface, out = (this.sums ??= new Float32Array(p.length)).fill(0);
+    const t = this.triangles, out = (this.sums ??= new Float32Array(p.length)).fill(0);
     for (let i = 0; i < t.length; i += 3) {
       const a = 3 * t[i], b = 3 * t[i + 1], c = 3 * t[i + 2];
       const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
       const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
-      const by = free[i / 3] ? 1 : 1e-3, x = by * (uy * vz - uz * vy), y = by * (uz * vx - ux * vz), z = by * (ux * vy - uy * vx);
+      const x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
       out[a] += x; out[a + 1] += y; out[a + 2] += z;
       out[b] += x; out[b + 1] += y; out[b + 2] += z;
       out[c] += x; out[c + 1] += y; out[c + 2] += z;

@@ -11,11 +11,12 @@ const newtons = (n) => (Math.abs(n) < 9.995 ? n.toFixed(2) : n.toFixed(1));
 class SeenTip {
   constructor(bytes) {
     const read = reader(bytes, about.arrays);
-    this.surface = new Surface(read("vertices", Float64Array), read("normals"), read("triangles", Uint32Array), read("free", Uint8Array));
+    const at = read("seen_at", Uint32Array), triangles = read("seen_triangles", Uint32Array);
+    this.surface = new Surface(read("vertices", Float64Array), read("normals"), triangles.map((i) => at[i]), read("free", Uint8Array));
     this.tables = new Tables(read, about);
     this.presses = { points: read("press_points", Float64Array), normals: read("press_normals", Float64Array), depth: read("press_depth"), force: read("press_force"), starts: about.presses.starts };
     this.presser = new Presser(this.surface, this.tables, about, this.presses);
-    this.shape = new Shape(this.surface, read, about);
+    this.shape = new Shape(this.surface, read, about, at, triangles);
     this.touch = new Touch(this.surface, this.tables, about.tip_radius_m, about.friction);
     this.mouse = new SpaceMouse(about.spacemouse);
     Object.assign(this, { place: null, goal: 0, depth: 0, held: false, greeting: null, pointers: new Map(), trail: [], peak: null, dirty: true, spent: [], asked: [] });

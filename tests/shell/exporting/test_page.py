@@ -254,6 +254,21 @@ def test_the_mouse_presses_slides_and_lets_go(tab):
     assert "greatest of the last press" in tab.evaluate("document.getElementById('parts').textContent")
 
 
+@needs_browser
+def test_a_rim_is_sharp_to_the_light(tab):
+    """It was lit by the normals that are felt, which round a rim over a tip's radius."""
+    points, normals = (
+        np.reshape(tab.evaluate(f"Array.from(palpate.page.shape.{name})"), (-1, 3))
+        for name in ("drawn", "normals")
+    )
+    corners = np.reshape(tab.evaluate("Array.from(palpate.page.shape.triangles)"), (-1, 3))
+    a, b, c = points[corners].transpose(1, 0, 2)
+    facing = np.cross(b - a, c - a)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    off = np.degrees(np.arccos(np.clip(np.einsum("kx,kcx->kc", facing, normals[corners]), -1, 1)))
+    assert (np.percentile(off, [95, 99]) < [20, 30]).all(), "27 and 90 by the normals that are felt"
+
+
 def test_a_page_presses_first_as_deep_as_the_game_asks_and_less_into_what_is_thin(block):
     """It began at 5 mm, where the game says 4, and a quarter into an object of 20 mm."""
     assert first_depth(block) == pytest.approx(min(FIND_M, 0.15 * np.ptp(block.mesh.points[:, 2])))

@@ -34,6 +34,8 @@ def test_an_exploration_of_one_sweep_says_what_is_missing_and_how_to_go_on(tmp_p
         and "outline is not known: slide once around" in page
         and '<section class="view3d"' not in page
     )
+    assert "The exploration has not ended, next:" in page
+    assert "palpate reconstruct" not in page, "of too few presses no model can be made"
 
 
 def test_a_page_says_once_what_was_asked_and_how_to_go_on_where_it_was_not_reached(tmp_path):
@@ -51,5 +53,6 @@ def test_a_page_says_once_what_was_asked_and_how_to_go_on_where_it_was_not_reach
     assert "asked" not in shown.lower() and shown.count("12.0 kPa within 5.9 %") == 2  # and its step's row
     assert "as many as allowed." in shown and "--most 10" in shown
     assert "asked: modulus within 5 %" in result.lines()[0]
+    assert "1 press in 28 s" in replace(result, state=replace(state, made=1)).lines()[0]
     met = replace(state, goals=(GoalState("modulus", 0.03, 0.05),))
     assert "--continue" not in replace(result, state=met).report(tmp_path / "p.html").read_text("utf-8")

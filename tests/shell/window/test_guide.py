@@ -146,6 +146,23 @@ def test_what_a_sliding_tip_met_is_not_told_as_presses_that_failed(guided):
     assert guide.lines()[1] == "no shape yet: 0 of 22 contacts are usable presses"
 
 
+def test_while_the_next_touch_is_thought_of_nothing_of_before_is_asked_for(guided):
+    """For half a minute after the whole foot was traced, its red part was missing."""
+    guide, servo, _, tracing = guided
+    waiting = []
+    guide._worker = SimpleNamespace(run=lambda words, job: waiting.append(job))
+    tracing.done = True
+    a_touch = (0.2, 0.0), (0.5, 0.7), (0.4, 0.0)
+    _frames(guide, servo, *a_touch)
+    assert len(waiting) == 1 and guide.lines()[0].startswith("wait")
+    waiting.pop()()
+    assert guide.ghost is not None and guide.lines()[0].startswith("press")
+    _frames(guide, servo, *a_touch)
+    assert guide.ghost is None
+    waiting.pop()()
+    assert guide.ghost is not None
+
+
 def test_the_ghost_stands_a_tips_radius_above_the_place(guided):
     guide, servo, explorer, tracing = guided
     tracing.done = True

@@ -24,14 +24,14 @@ from palpate.show.colours import COLOURS
 from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
 from palpate.window.keys import KEYS
-from palpate.window.panel import DEPTH
+from palpate.window.panel import DEPTH, NextStep
 from palpate.window.session import SessionOptions
 from palpate.window.widgets import BODY, fitted
 from palpate.window.widgets import SIZE as FULL
 from palpate.window.window import COLUMN, TouchWindow
 
 from ...support.waiting import PATIENCE_S, eventually
-from .driven import Driven, driving
+from .driven import HALF, Driven, driving
 
 SIZE = (640, 480)
 NODULE, UP = Ball((0.0, 0.0, 0.02), 0.005, 8.0), np.array([0.0, 0.0, 1.0])
@@ -363,6 +363,7 @@ def test_enter_while_pressing_keeps_the_answer(driven: Driven, monkeypatch) -> N
     monkeypatch.setattr(driven.window, "game", game)
     press(driven)
     driven.says("It is here")
+    driven.says("Move the mouse", says=False)
     driven.key("Return")
     driven.wait(0.05)
     assert game.answered and len(game.answers) == 1, "the press that goes on begins no round"
@@ -372,6 +373,30 @@ def test_enter_while_pressing_keeps_the_answer(driven: Driven, monkeypatch) -> N
     assert game.answered and seen_through(driven)
     press(driven)
     assert not game.answered and not seen_through(driven), "the next touch does"
+    release(driven)
+
+
+def test_the_button_of_the_answer_means_the_last_press(driven: Driven, monkeypatch) -> None:
+    """The mouse's way to the button leads over the table, and the tip hovers after it."""
+    game = Game([NODULE], UP)
+    monkeypatch.setattr(driven.window, "game", game)
+    pressed = press(driven).tip_m
+    release(driven)
+    driven.mouse(0.01, 0.3)
+    driven.rests()
+    driven.click("It is here")
+    assert game.answers[0].off_m == pytest.approx(np.hypot(*(pressed - NODULE.centre_m)[:2]), abs=1e-3)
+    driven.frame()
+
+
+def test_a_button_that_is_held_on_the_support_is_asked_for_no_more(driven: Driven) -> None:
+    """Along the whole foot, which is traced with it, it was."""
+    said = NextStep(driven.window, mouse=True)
+    driven.mouse_at(np.array([0.0, -HALF - 0.02, 0.0]))
+    driven.rests()
+    driven.button(True)
+    leaning = driven.until(lambda frame: not frame.touching and any(sizes(frame)))
+    assert "left button" not in said.line(leaning)
     release(driven)
 
 
