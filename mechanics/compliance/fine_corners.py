@@ -144,6 +144,17 @@ def linear_at(points: np.ndarray, corners: np.ndarray, triangles: np.ndarray, ow
     return np.einsum("kc,kc->k", own[triangles[triangle]], weights)
 
 
+def quadratic_at(
+    points: np.ndarray, corners: np.ndarray, triangles: np.ndarray, values: np.ndarray
+) -> np.ndarray:
+    """(k, 3, 3) at points (k, 3), quadratic in the nearest of triangles (g, 3) of corners (v, 3), from values
+    (v, 3, 3): as a compliance is interpolated."""
+    _, triangle, weights = closest(corners, triangles, points)
+    met, which = np.unique(triangle, return_inverse=True)
+    middles = EdgeMiddles(corners, triangles)(values, met)
+    return interpolated(values[triangles[triangle]], middles[which], weights)
+
+
 def less_half_space(own: np.ndarray, normals: np.ndarray, poisson_ratio: float, width_m: float) -> np.ndarray:
     """(k, 3, 3) far field, 1/m, of places whose own compliance and normals these are."""
     return own - half_space_compliance(normals, poisson_ratio, width_m)

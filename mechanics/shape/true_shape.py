@@ -197,9 +197,10 @@ class TrueShape:
         weights[np.arange(len(row)), (edge[row] + 1) % 3] += share
         return self.on(triangle[row], weights)[0]
 
-    def creases_cut(self, longest_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Creases in straight pieces of at most `longest_m`: middles (k, 3) m, lengths (k,) m, and by what
-        angle (k,) rad the surface turns there, positive where it is convex."""
+    def creases_cut(self, longest_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Creases in straight pieces of at most `longest_m`: middles (k, 3) m, lengths (k,) m, by what angle
+        (k,) rad the surface turns there, positive where it is convex, and the unit way (k, 3) across it,
+        square to the crease and to the mean of its two normals."""
         facets = self._facets
         triangle, edge = np.nonzero(facets.crease & (np.arange(len(self.triangles))[:, None] < facets.across))
         start, end = (self.vertices[self.triangles[triangle, (edge + k) % 3]] for k in (0, 1))
@@ -207,7 +208,7 @@ class TrueShape:
         convex = np.einsum("kx,kx->k", np.cross(own, other), end - start)
         middles, length, row = segments_cut(start, end, longest_m)
         turn = np.copysign(angle_between(own, other), convex)
-        return middles, length, turn[row]
+        return middles, length, turn[row], unit_vectors(own - other, own)[row]
 
     def on(self, triangle: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
+from palpate.mechanics.compliance.fine_corners import quadratic_at
 from palpate.mechanics.compliance.local_material import given_back
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
+from palpate.mechanics.compliance.patch import half_space_compliance, usual_width
 from palpate.mechanics.compliance.sites import contact_curvature
 from palpate.mechanics.compliance.surface_compliance import SurfaceCompliance
 from palpate.mechanics.contact.dent import DentLaw
-from palpate.mechanics.contact.edges import edge_law
+from palpate.mechanics.contact.edges import edge_law, peaks
 from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.model.model import Model
@@ -19,6 +21,7 @@ from palpate.render.surface.contact_surface import ContactSurface
 from palpate.render.surface.snapping import touched_surface
 
 Compliance = SurfaceCompliance | OnDemandCompliance | CoarseCompliance
+_UP = np.array([0.0, 0.0, 1.0])
 
 
 class FineSurface:
@@ -51,6 +54,11 @@ class FineSurface:
         self._rims[touched] = missed.curvature
         self.softness[touched], back = given_back(model, points, normals, float(compliance.own_width_m[0]))
         self._added[touched] += back
+        # a rim's peak is narrower than corners lie apart: it is taken off theirs and given back where it is
+        width = max(float(compliance.own_width_m[0]), usual_width(mesh))
+        give = half_space_compliance(_UP, float(compliance.poisson_ratio[0]), width)[2, 2]
+        self._peaks = give * peaks(mesh, compliance.own_points, width)
+        self._added[touched] += give * peaks(mesh, points, width)
         if mesh.shape is None:  # all are fitted at once: each is the same only among the same
             bent = _curvature(model, points, normals)
             self.curvature[touched] = bent + missed.curvature
@@ -69,7 +77,7 @@ class FineSurface:
             whole = len(new) == len(self._touched)
             bent = kept_curvature(model, points, normals) if whole else _curvature(model, points, normals)
             self.curvature[new] = bent + self._rims[new]
-        far = compliance.far_at(points, normals) + self._added[new]
+        far = self._far_at(compliance, new)
         if not np.isfinite(far).all():
             raise MeshError("the compliance is not known all over the surface: solve it anew")
         self.far[new] = far
@@ -78,9 +86,17 @@ class FineSurface:
     def field_of(self, compliance: Compliance) -> tuple[np.ndarray, np.ndarray]:
         """(far (v, 3, 3), bracing (v,)), 1/m, by another compliance of the same object."""
         far, bracing, at = np.zeros_like(self.far), np.array(self._without_balls), self._touched
-        far[at] = compliance.far_at(self._vertices[at], self._normals[at]) + self._added[at]
+        far[at] = self._far_at(compliance, at)
         bracing[at] += compliance.bracing_at(self._vertices[at])
         return far, bracing
+
+    def _far_at(self, compliance: Compliance, vertices: np.ndarray) -> np.ndarray:
+        """(k, 3, 3) 1/m at vertices (k,)."""
+        points = self._vertices[vertices]
+        far = compliance.far_at(points, self._normals[vertices]) + self._added[vertices]
+        if self._peaks.any():
+            far -= quadratic_at(points, compliance.own_points, compliance.own_triangles, self._peaks)
+        return far
 
 
 def keep_surface(model: Model, options: RenderOptions) -> None:

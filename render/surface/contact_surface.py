@@ -124,7 +124,7 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, strip_m: float = R
             feet, vertices, triangles, free, parent_weights, LARGEST
         )
         free, parents = free[within], parents[within]
-        placed = on_shape(feet, vertices, triangles, free, parent_weights, strip_m)
+        placed = on_shape(feet, mesh, vertices, triangles, free, parent_weights, strip_m, LARGEST)
         vertices, triangles, parent_weights = placed.vertices, placed.triangles, placed.weights
         free, parents = free[placed.within], parents[placed.within]
     across = neighbours(triangles)

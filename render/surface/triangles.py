@@ -7,8 +7,10 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.shape.nearest import facings
 
-_WIDER = 1.15
-"""Widths that a vertex must be away from a rim for its edges to be cut."""
+_NARROWER, _WIDER = 0.97, 1.15
+"""Widths from a rim within and beyond which the ends of an edge that is cut lie. Of edges from the rim alone,
+a vertex 0.9 widths beside it carried its turned normal to the next one: 1.4 widths beside a wedge's rim a
+force was 7 % off."""
 _PATTERNS = tuple(
     np.array(p)
     for p in (
@@ -36,14 +38,15 @@ def cut_beside(
     ends = np.unique(
         np.sort(np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2), axis=1), axis=0
     )
-    ends = ends[on_rim[ends].any(axis=1)]
-    both, first = on_rim[ends].all(axis=1), on_rim[ends[:, 0]]
-    inner = vertices[np.where(first, ends[:, 1], ends[:, 0])]
-    away = line.query(np.where(both[:, None], vertices[ends].mean(axis=1), inner))[0]
-    wide = away > np.where(both, 0.4, _WIDER) * width_m
-    ends, both, away, first = ends[wide], both[wide], away[wide], first[wide]
-    share = np.where(both, 0.5, width_m / away)
-    return cut(vertices, triangles, weights, ends, np.where(first, share, 1 - share))
+    both = on_rim[ends].all(axis=1)
+    across = line.query(vertices[ends[both]].mean(axis=1))[0] > 0.4 * width_m
+    away = line.query(vertices)[0] / width_m
+    away[on_rim] = 0.0
+    low, high = np.sort(away[ends], axis=1).T
+    passing = (low < _NARROWER) & (high > _WIDER)
+    share = (1 - away[ends[passing, 0]]) / (away[ends[passing, 1]] - away[ends[passing, 0]])
+    ends = np.concatenate([ends[both][across], ends[passing]])
+    return cut(vertices, triangles, weights, ends, np.concatenate([np.full(across.sum(), 0.5), share]))
 
 
 def pseudonormals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
