@@ -17,7 +17,7 @@ import palpate as pp
 from palpate import cli
 from palpate.batching import plan as run
 from palpate.batching import steps
-from palpate.batching.plan import Choice, find, tasks_of
+from palpate.batching.plan import BatchChoice, find, tasks_of
 from palpate.batching.summary import COLUMNS, Row, agreement
 
 from .test_batch_driver import Here
@@ -109,19 +109,19 @@ def test_names_that_only_dashes_tell_apart_stay_two(tmp_path):
 def test_a_key_is_of_bytes_options_and_seed_and_not_of_places(tmp_path):
     def keys(path, choice=None, out="out"):
         (found,) = find([path], tmp_path / out)
-        return [task.key for task in tasks_of(found, choice or Choice(), tmp_path / out)]
+        return [task.key for task in tasks_of(found, choice or BatchChoice(), tmp_path / out)]
 
     first = keys(recording(tmp_path / "a" / "bean.csv"))
     assert first == keys(recording(tmp_path / "b" / "bean.csv"), out="elsewhere")
     assert len(set(first)) == 3
     assert not set(first) & set(keys(recording(tmp_path / "c" / "bean.csv", 21e3)))
-    fast = keys(tmp_path / "a" / "bean.csv", Choice(options={"diagnose": {"fast": True}}))
+    fast = keys(tmp_path / "a" / "bean.csv", BatchChoice(options={"diagnose": {"fast": True}}))
     assert [a == b for a, b in zip(first, fast, strict=True)] == [True, True, False]
-    assert not set(first) & set(keys(tmp_path / "a" / "bean.csv", Choice(seed=1)))
+    assert not set(first) & set(keys(tmp_path / "a" / "bean.csv", BatchChoice(seed=1)))
     shapes = []
     for name, text in (("1.stl", "solid"), ("2.stl", "solid"), ("3.stl", "other")):
         (tmp_path / name).write_text(text)
-        choice = Choice(options={"reconstruct": {"shape": str(tmp_path / name)}})
+        choice = BatchChoice(options={"reconstruct": {"shape": str(tmp_path / name)}})
         shapes.append(keys(tmp_path / "a" / "bean.csv", choice))
     assert shapes[0] == shapes[1] != first and not set(shapes[1]) & set(shapes[2])
 
