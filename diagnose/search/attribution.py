@@ -139,12 +139,12 @@ def attribute(
 
     seen: names that are known to be there from elsewhere: they are taken first, and stay.
     """
-    forward = _Selection(search, effects, seen)
+    selection = _Selection(search, effects, seen)
     most = search.options.greatest_number
     for step in range(most):
-        if not forward.step(part(progress, step / most, (step + 1) / most)):
+        if not selection.step(part(progress, step / most, (step + 1) / most)):
             break
-    steps, current, chosen = forward.steps, forward.current, forward.chosen
+    steps, current, chosen = selection.steps, selection.current, selection.chosen
     picked = tuple(chosen)[: len(steps)]
     current, chosen = _without_idle(search, chosen, current, seen)
     if any(n not in seen for n in chosen):
@@ -153,8 +153,9 @@ def attribute(
         current = _refined(search, effect, current)
     order = tuple(_strongest_first(search, current, chosen))
     return Attribution(
-        forward.base, forward.ideal, forward.deep, steps[0], order, current,
-        posterior(forward.choices, order), tuple(steps), picked, forward.strain_gain, forward.strain_closes,
+        selection.base, selection.ideal, selection.deep, steps[0], order, current,
+        posterior(selection.choices, order), tuple(steps), picked,
+        selection.strain_gain, selection.strain_closes,
     )  # fmt: skip
 
 
