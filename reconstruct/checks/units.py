@@ -183,7 +183,7 @@ def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:
     rise = data.t[touches.peak] - data.t[touches.start]
     good = (depth > max(3 * float(data.step[:3].max()), _LEAST_M)) & (rise > 0)
     # what barely leaves the noise is felt late and lost early
-    good &= peak > CLEAR * data.filtered.least * data.spread_n
+    good &= peak > CLEAR * data.filtered.threshold_n
     if good.sum() > 3:
         plane = 4 / 3 * np.sqrt(radius) * depth[good] ** 1.5
         found |= {

@@ -19,7 +19,7 @@ from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.shape.nearest import facings, triangle_areas
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape
-from palpate.render.surface.triangles import cut, cut_beside, pseudonormals
+from palpate.render.surface.triangles import cut, cut_beside, edges_of, pseudonormals
 
 SAG_M = 8e-6
 """Between the middle of a fine edge and the shape: what is more is halved."""
@@ -91,8 +91,7 @@ def halved_where_bent(
     known, gaps = np.zeros(0, dtype=np.int64), np.zeros(0)
     for _ in range(_HALVINGS):
         touch = triangles[free[within] > 0]
-        ends = np.sort(np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-        ends = np.unique(ends, axis=0)
+        ends = edges_of(touch)
         placed, normals = feet(vertices, np.unique(touch))
         bent = np.linalg.norm(normals[ends[:, 0]] - normals[ends[:, 1]], axis=1)
         ends = ends[(bent > 1e-6) & (np.einsum("kx,kx->k", *normals[ends.T]) > _CROSSES)]
@@ -173,7 +172,7 @@ def on_shape(
     own, away = own[away < strip_m], away[away < strip_m]
     facing = between[cKDTree(placed[rims]).query(placed[own])[1]]
     normals[own] = _towards(normals[own], facing, 1 - away / strip_m)
-    return made
+    return made._replace(normals=normals)
 
 
 def _halved_where_uneven(
@@ -187,8 +186,7 @@ def _halved_where_uneven(
     sharp = np.concatenate([sharp, np.zeros(len(vertices) - len(sharp), dtype=bool)])
     for _ in range(_HALVINGS):
         touch = triangles[free[within] > 0]
-        ends = np.sort(np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-        ends = np.unique(ends, axis=0)
+        ends = edges_of(touch)
         ends = ends[ends[:, 1] >= seen]
         felt = np.concatenate([felt, softer(mesh, vertices[len(felt) :], normals[len(felt) :])])
         seen, middles = len(vertices), vertices[ends].mean(axis=1)

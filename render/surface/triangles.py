@@ -23,6 +23,12 @@ _PATTERNS = tuple(
 """Triangles of corners 0 to 2 and points on the edges 01, 12, 20, by how many of these are cut."""
 
 
+def edges_of(triangles: np.ndarray) -> np.ndarray:
+    """(e, 2) vertices of the edges of triangles (k, 3), each once, the lower first, sorted."""
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    return np.unique(np.sort(ends, axis=1), axis=0)
+
+
 def cut_beside(
     vertices: np.ndarray,
     triangles: np.ndarray,
@@ -35,9 +41,7 @@ def cut_beside(
     """`cut` triangles (free (k,): 1 where they may be touched) `width_m` beside a rim: points `line` along
     it, and on_rim (v,) bool, the vertices that lie on it."""
     touch = triangles[free > 0]
-    ends = np.unique(
-        np.sort(np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2), axis=1), axis=0
-    )
+    ends = edges_of(touch)
     both = on_rim[ends].all(axis=1)
     across = line.query(vertices[ends[both]].mean(axis=1))[0] > 0.4 * width_m
     away = line.query(vertices)[0] / width_m

@@ -86,6 +86,11 @@ class Filtered:
         """How many spreads a touch must reach (reconstruct.steps.s1_filter.noise)."""
         return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
 
+    @property
+    def threshold_n(self) -> float:
+        """N that a touch reaches where the noise is least."""
+        return self.least * float(self.spread.min())
+
     @cached_property
     def touching(self) -> np.ndarray:
         """(n,) bool: where something is touched, on the way or on purpose."""

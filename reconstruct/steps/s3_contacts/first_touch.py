@@ -229,7 +229,7 @@ def find_first_touches(spans: ContactSpans, request: TouchRequest) -> FirstTouch
 
 
 def _threshold_n(filtered: Filtered, request: TouchRequest) -> float:
-    return PAPER_THRESHOLD_N if request.method == "paper" else filtered.least * float(filtered.spread.min())
+    return PAPER_THRESHOLD_N if request.method == "paper" else filtered.threshold_n
 
 
 def _parts(filtered: Filtered, a: int, b: int) -> list[Piece]:
