@@ -21,7 +21,7 @@ from palpate.mechanics.errors import MeshError
 from palpate.mechanics.kernels import kernel
 from palpate.mechanics.progress import Progress, silent
 
-_AT_ONCE = 32  # patches that are solved for together
+_AT_ONCE = 128  # patches that are solved for together
 _STEP = 120  # load patterns before the first look at the error; then a third more each time
 
 
@@ -94,14 +94,7 @@ def compress(
 
 def own_compliance(solver: Solver, average: sp.csr_matrix) -> np.ndarray:
     """(k, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; weights (k, n)."""
-    weights = average.tocoo()
-    row = np.full(3 * len(solver.mesh.points), -1)
-    row[solver.free] = np.arange(len(solver.free))
-    loads = np.zeros((len(solver.free), 3 * weights.shape[0]), order="F")
-    for axis in range(3):
-        at = row[3 * weights.col + axis]
-        loads[at[at >= 0], 3 * weights.row[at >= 0] + axis] = weights.data[at >= 0]
-    return solver.quadratic_forms(loads.T.reshape(-1, 3, len(loads)).transpose(2, 0, 1))
+    return solver.quadratic_forms(sp.kron(average, sp.eye(3), format="csc").T.tocsr()[solver.free])
 
 
 def own_blocks(

@@ -69,6 +69,51 @@ def invert(matrix: np.ndarray) -> int:
     return 0
 
 
+def eliminate(front: np.ndarray, width: int) -> int:
+    """The first unknowns of a symmetric positive definite front (m, m), in its lower triangle, columns
+    contiguous: L of them and, below, of the others, and what is left of these; 0, or the failing row."""
+    m, rest = front.strides[1] // 8, len(front) - width
+    at = front.ctypes.data
+    below, last = at + 8 * width, at + 8 * (m + 1) * width
+    info = ctypes.c_int32(0)
+    lower = ctypes.c_char(b"L")
+    _mkl().dpotrf(ctypes.byref(lower), _integer(width), ctypes.c_void_p(at), _integer(m), ctypes.byref(info))
+    if rest and not info.value:
+        _blas("dtrsm", b"RLTN", (rest, width), 1.0, (at, m), (below, m))
+        _blas("dsyrk", b"LN", (rest, width), -1.0, (below, m), 1.0, (last, m))
+    return int(info.value)
+
+
+def solve_lower(lower: np.ndarray, right: np.ndarray, *, transposed: bool = False) -> None:
+    """L^-1 b or L'^-1 b in place of b (k, r), from L (k, k); both in Fortran's order."""
+    how = b"LLTN" if transposed else b"LLNN"
+    k, r = right.shape
+    if r and k:
+        _blas("dtrsm", how, (k, r), 1.0, (lower.ctypes.data, k), (right.ctypes.data, k))
+
+
+def product(a: np.ndarray, b: np.ndarray, *, transposed: bool = False) -> np.ndarray:
+    """a b, or a' b, in Fortran's order, as a and b are."""
+    (k, m), n = (a.shape if transposed else a.shape[::-1]), b.shape[1]
+    result = np.zeros((m, n), order="F")
+    if result.size and k:
+        arrays = (a.ctypes.data, len(a)), (b.ctypes.data, k), 0.0, (result.ctypes.data, m)
+        _blas("dgemm", b"TN" if transposed else b"NN", (m, n, k), 1.0, *arrays)
+    return result
+
+
+def _blas(name: str, how: bytes, sizes: tuple[int, ...], *rest: float | tuple[int, int]) -> None:
+    """A routine by its letters, sizes, factors, and arrays with their leading dimensions."""
+    values: list[object] = [ctypes.byref(ctypes.c_char(letter.to_bytes())) for letter in how]
+    values += [_integer(size) for size in sizes]
+    for each in rest:
+        if isinstance(each, tuple):
+            values += [ctypes.c_void_p(each[0]), _integer(each[1])]
+        else:
+            values.append(ctypes.byref(ctypes.c_double(each)))
+    getattr(_mkl(), name)(*values)
+
+
 def _integer(value: int) -> object:
     return ctypes.byref(ctypes.c_int32(value))
 
@@ -155,7 +200,8 @@ class Pardiso(_Handle):
             self._perm[schur] = 1
             self._iparm[35] = 1  # only the Schur complement, no factors to solve with
         elif group > 1:
-            self._perm = _dissected(upper, group)
+            groups = dissection(graph_of_groups(matrix, group))
+            self._perm = (group * groups[:, None] + np.arange(group, dtype=np.int32)).ravel()
             self._iparm[4] = 1  # in that order
         self._call(12, np.zeros(1), np.zeros(1) if out is None else out, 0)
         self.factor_nonzeros = int(self._iparm[17])
@@ -190,13 +236,56 @@ class _Order(_Handle):
         return self._perm
 
 
-def _dissected(upper: sp.csr_matrix, group: int) -> np.ndarray:
-    """(n,) int32, the order of elimination by nested dissection of the graph of groups."""
-    first = upper[::group]
-    size = upper.shape[0] // group
+def graph_of_groups(matrix: sp.csr_matrix, group: int) -> sp.csr_matrix:
+    """Which groups of unknowns that follow one another meet: (k, k), sorted, from a matrix (group k, ...)."""
+    first, size = matrix[::group], matrix.shape[0] // group
     graph = sp.csr_matrix((np.ones(first.nnz), first.indices // group, first.indptr), shape=(size, size))
     graph.sum_duplicates()
-    return (group * _Order(graph).found()[:, None] + np.arange(group, dtype=np.int32)).ravel()
+    return graph
+
+
+def dissection(graph: sp.csr_matrix) -> np.ndarray:
+    """(n,) the nodes of a graph (n, n) in the order of elimination by nested dissection."""
+    upper = sp.triu(graph, format="csr")
+    upper.sort_indices()
+    return _Order(upper).found()
+
+
+class SchurFactor:
+    """A matrix (k, k), CSR, both triangles, and what it takes from those that it borders on.
+
+    border: (k, b), CSR, B.
+    """
+
+    def __init__(self, matrix: sp.csr_matrix, border: sp.csr_matrix) -> None:
+        k, b = border.shape
+        self._own = k
+        upper = sp.vstack(
+            [sp.hstack([sp.triu(matrix), border]), sp.hstack([sp.csr_matrix((b, k)), sp.eye(b)])]
+        )
+        upper = upper.tocsr()
+        upper.sort_indices()
+        rows, columns = upper.indptr.astype(np.int32), upper.indices.astype(np.int32)
+        self._phases = _Phases(_DEFINITE, rows, columns, np.arange(k, k + b))
+        self._left = self._phases.factorise(upper.data)
+
+    def taken(self) -> np.ndarray:
+        """-B' A^-1 B (b, b), columns contiguous; asked once, and not kept."""
+        left, self._left = self._left, np.zeros((0, 0))
+        return (left - np.eye(len(left))).T
+
+    def forward(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(L^-1 b (k, r), -B' A^-1 b (b, r)) of right-hand sides (k, r)."""
+        count = right.shape[1]
+        whole = np.zeros((self._phases.size, -(-count // _LANES) * _LANES), order="F")
+        whole[: self._own, :count] = right
+        half = self._phases.solve_many(331, whole)[:, :count]
+        return half[: self._own], half[self._own :]
+
+    def backward(self, half: np.ndarray, border: np.ndarray) -> np.ndarray:
+        """x (k, r) from L^-1 b (k, r) and the border's x (b, r)."""
+        whole = np.asfortranarray(np.concatenate([half, border]))
+        return self._phases.solve_many(333, whole)[: self._own]
 
 
 class PartialFactor:
@@ -252,7 +341,8 @@ class _Phases:
         self.size, self._count = len(rows) - 1, len(kept)
         self._handle, self._iparm = np.zeros(64, dtype=np.int64), np.zeros(64, dtype=np.int32)
         # values of our own, nested dissection, perturbed pivots, Schur complement with factors, zero-based
-        for place, value in ((0, 1), (1, 2), (9, 13 if kind == _DEFINITE else 8), (34, 1), (35, 2)):
+        pivots, schur = 13 if kind == _DEFINITE else 8, 2 if len(kept) else 0
+        for place, value in ((0, 1), (1, 2), (9, pivots), (34, 1), (35, schur)):
             self._iparm[place] = value
         self._perm = np.zeros(self.size, dtype=np.int32)
         self._perm[kept] = 1
@@ -270,12 +360,18 @@ class _Phases:
         self._call(phase, right, solution)
         return solution
 
-    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray) -> None:
+    def solve_many(self, phase: int, right: np.ndarray) -> np.ndarray:
+        """The same for (n, r), in Fortran's order."""
+        solution = np.zeros_like(right)
+        self._call(phase, right, solution, right.shape[1])
+        return solution
+
+    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int = 1) -> None:
         error = ctypes.c_int32(0)
         _mkl().pardiso(
             _pointer(self._handle), _integer(1), _integer(1), _integer(self.kind), _integer(phase),
             _integer(self.size), _pointer(self._values), _pointer(self._rows), _pointer(self._columns),
-            _pointer(self._perm), _integer(1), _pointer(self._iparm), _integer(0), _pointer(right),
+            _pointer(self._perm), _integer(count), _pointer(self._iparm), _integer(0), _pointer(right),
             _pointer(solution), ctypes.byref(error),
         )  # fmt: skip
         if error.value:

@@ -68,6 +68,8 @@ def test_noise_is_noise(bench):
     result = diagnose(*bench.record(), FAST)
     assert not any(result.where.bins["press_n"])
     assert result.kind == "none" and not result.effects
+    # beside a gripper of 500 N/m the modulus was 23 % off, and "larger effects would have been named"
+    assert "a tool that gives" in how_sure(result)[2]
     assert result.gap_before_n < 1.5 * result.noise_n
     assert result.young_modulus_pa == pytest.approx(20e3, rel=0.03)
 

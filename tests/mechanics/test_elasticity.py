@@ -8,9 +8,11 @@ import sys
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from palpate.mechanics.compliance.patch import PatchSampler
+from palpate.mechanics.elastic.dissected import DissectedFactor
 from palpate.mechanics.elastic.elasticity import element_stiffness, lame_parameters, stiffness, strain
 from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.elastic.pardiso import Pardiso, available
@@ -197,6 +199,47 @@ def test_a_load_gives_the_same_bits_alone_and_among_others(box):
     halves = factor.half_solve(loads)
     for count in (1, 2, 3, 6, 11, 34):
         assert (factor.half_solve(loads[:, 5 : 5 + count]) == halves[:, 5 : 5 + count]).all()
+
+
+@pytest.fixture(scope="module")
+def dissected(box):
+    """A block's stiffness, beside a small one that nothing joins to it, in one factor and in many."""
+    parts = [
+        Solver(box(count, (0.1, 0.07, 0.05)).quadratic(), 0.49).matrix for count in ((6, 5, 4), (2, 2, 1))
+    ]
+    matrix = sp.block_diag(parts, format="csr")
+    return matrix, Pardiso(matrix), DissectedFactor(matrix, part=60)
+
+
+@pytest.mark.skipif(not available(), reason="MKL Pardiso is not there")
+def test_a_dissected_mesh_solves_as_a_whole(dissected):
+    matrix, whole, parts = dissected
+    loads = np.random.default_rng(4).normal(size=(matrix.shape[0], 5))
+    expected = whole.solve(loads)
+    np.testing.assert_allclose(parts.solve(loads), expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(parts.solve(loads[:, 0]), parts.solve(loads)[:, 0], rtol=1e-12)
+    nearly = matrix - 1.5 * sp.diags(matrix.diagonal())
+    with pytest.raises(ArithmeticError):
+        DissectedFactor(nearly.tocsr(), part=60)
+
+
+@pytest.mark.skipif(not available(), reason="MKL Pardiso is not there")
+def test_loads_on_few_nodes_of_a_dissected_mesh_give_its_forms(dissected):
+    """The same bits alone and among others; loads on parts, on separators and on both."""
+    matrix, whole, parts = dissected
+    rng = np.random.default_rng(5)
+    loads = np.zeros((matrix.shape[0], 3 * 40))
+    for k in range(40):
+        near = 3 * rng.integers(0, matrix.shape[0] // 3 - 8) + np.arange(24)
+        loads[near, 3 * k : 3 * k + 3] = rng.normal(size=(24, 3))
+    half = whole.half_solve(loads).reshape(-1, 40, 3)
+    found = parts.quadratic_forms(sp.csr_matrix(loads))
+    np.testing.assert_allclose(
+        found, np.einsum("fri,frj->rij", half, half), rtol=1e-9, atol=1e-9 * found.max()
+    )
+    for some in ([0], [7, 8], [39, 3, 20]):
+        alone = sp.csr_matrix(loads.reshape(-1, 40, 3)[:, some].reshape(len(loads), -1))
+        assert (parts.quadratic_forms(alone) == found[some]).all()
 
 
 def test_a_solver_has_the_stiffness_of_what_is_free(box):

@@ -127,6 +127,12 @@ def answers(result: Diagnosis) -> list[tuple[str, str, str]]:
     return [how_sure(result), where(result), _how_far(result)]
 
 
+AS_A_MODULUS = (
+    "Sizes are what another modulus does not take up: a tool that gives, or a wrong gain of the force, makes "
+    "the modulus itself wrong. Presses on the bare support show a tool that gives."
+)
+
+
 def how_sure(result: Diagnosis) -> tuple[str, str, str]:
     question = "How sure is it?"
     likely = result.explanations[:MOST_SETS]
@@ -134,7 +140,7 @@ def how_sure(result: Diagnosis) -> tuple[str, str, str]:
     if result.kind == "none":
         smaller = "Smaller ones may be there; deeper, faster or longer touches would show them."
         weighed = f"These touches leave open: {left}. " if result.candidates else ""
-        text = f"{weighed}{begun(limits(result, FIRST_LIMITS))}. {smaller}"
+        text = f"{weighed}{begun(limits(result, FIRST_LIMITS))}. {smaller} {AS_A_MODULUS}"
         return question, "Larger effects would have been named", text
     if result.candidates:
         also = "; ".join(f"{spaced(n)}: {meaning(n)}" for n in result.candidates)
