@@ -112,6 +112,7 @@ def _colouring(colouring: Colouring, view: View, at: np.ndarray) -> dict[str, An
         values = np.where(thing.touchable, values, np.nan)
     every = np.concatenate([v[np.isfinite(v)] for v in (values, own) if v is not None]) * quantity.scale
     low, high = np.percentile(every, _SHOWN_SHARE) if values is not None else (every.min(), every.max())
+    high = max(high, colouring.reach * quantity.scale)
     stops = colormaps[quantity.colour_map](np.linspace(0.0, 1.0, _STOPS))
     return {
         "name": colouring.title,
@@ -214,13 +215,15 @@ class Thing:
 class Colouring:
     """What the object is coloured by, SI: surface (v,) a value at each point of the thing, NaN where none is
     known; presses (p,) one a press. Of presses alone the surface takes what is near, and fades where nobody
-    touched. words: what the numbers are, if that is not plain. name: instead of the quantity's."""
+    touched. words: what the numbers are, if that is not plain. name: instead of the quantity's. reach: to
+    which the colours go at least, as what is noise is no alarm."""
 
     quantity: ShownQuantity
     surface: np.ndarray | None = None
     presses: np.ndarray | None = None
     words: str = ""
     name: str = ""
+    reach: float = 0.0
 
     @property
     def title(self) -> str:

@@ -23,13 +23,14 @@ from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.presses.gap_bins import gap_by_bin
 from palpate.reconstruction.presses_on_model import presses_on
 from palpate.show.demo import diagnosis_json, diagnosis_words
-from palpate.show.diagnosis.figures import press_pictures
+from palpate.show.diagnosis.figures import press_pictures, view
 from palpate.show.diagnosis.gaps import press_gaps
 from palpate.show.diagnosis.parameters import parameter_rows, short
 from palpate.show.diagnosis.story import next_steps
 from palpate.show.diagnosis.truth import truth_lines
 from palpate.show.diagnosis.words import how_sure, short_verdict, verdict, where
 from palpate.show.page import file_text
+from palpate.show.view3d import _data
 from palpate.words import force_words, spoken
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
@@ -70,6 +71,8 @@ def test_noise_is_noise(bench):
     assert result.kind == "none" and not result.effects
     # beside a gripper of 500 N/m the modulus was 23 % off, and "larger effects would have been named"
     assert "a tool that gives" in how_sure(result)[2]
+    # what is noise was black, as the colours ended below it
+    assert _data(view(result))["colourings"][0]["high"] >= 3e3 * result.noise_n
     assert result.gap_before_n < 1.5 * result.noise_n
     assert result.young_modulus_pa == pytest.approx(20e3, rel=0.03)
 

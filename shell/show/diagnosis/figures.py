@@ -35,6 +35,9 @@ from palpate.show.story import Picture
 from palpate.show.view3d import Colouring, Line, View
 from palpate.words import spoken
 
+_OVER_NOISE = 3.0
+"""Of the noise, to which the colours of a force error go at least: what is noise is no alarm."""
+
 
 def first_picture(model: Model, result: Diagnosis, simulated: str = "simplest") -> Any:
     """Where on the object, and how it looks in the press that differs most. simulated: whose force is
@@ -79,6 +82,7 @@ def view(result: Diagnosis, simulated: str = "simplest") -> View:
         each,
         "Measured less simulated, root mean square over each press; between presses what is near, "
         "paler where it was not touched.",
+        reach=_OVER_NOISE * result.noise_n,
     )
     force = "sideways" if sideways(result) else "into"
     return view_of_presses(model, t, [error, *usual_colourings(model, t)], lines, worst_press(result), force)
@@ -91,7 +95,8 @@ def _object(ax: Any, model: Model, result: Diagnosis) -> None:
     worst = np.array(result.where.worst[0][:3])
     t = gap_of(result)[0]
     azimuth = facing(model.support.normal, t.normal[int(np.argmin(np.linalg.norm(t.point - worst, axis=1)))])
-    draw_object(ax, model, Colours(values, ERROR), touches=places, azimuth_deg=azimuth)
+    limits = 0.0, max(float(values.max()), _OVER_NOISE * result.noise_n * ERROR.scale)
+    draw_object(ax, model, Colours(values, ERROR, limits), touches=places, azimuth_deg=azimuth)
     seen = view_axes(model.support.normal, 25.0, azimuth)
     x, y, _ = (worst - model.mesh.points.mean(axis=0)) @ seen.T * 1e3
     ax.scatter([x], [y], s=190, facecolors="none", edgecolors=COLOURS["touch"], linewidths=2.2, zorder=4)
