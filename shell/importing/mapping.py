@@ -161,6 +161,8 @@ def read_mapping(path: Path | str) -> dict[str, Any]:
         found["tare_s"] = (float(held["tare"].get("start_s", 0.0)), float(held["tare"]["end_s"]))
     if "object" in held:
         found["thing"] = held["object"]
+        if "shape" in held["object"]:
+            found["thing"] |= {"shape": str(path.parent / held["object"]["shape"])}
     return found
 
 

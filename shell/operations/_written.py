@@ -14,8 +14,6 @@ from palpate.show.page import file_words
 if TYPE_CHECKING:
     from palpate.mechanics.model.model import Model
 
-_OF_IMPORT = {"slab_m": "slab"}
-"""What import calls by another name."""
 _GEOMETRIES = {"shape", "slab_m", "half_space"}
 
 
@@ -35,9 +33,7 @@ def open_words(given: Mapping[str, Any], more: Mapping[str, Any]) -> str:
 def import_words(given: Mapping[str, Any], output: str) -> str:
     """The command `palpate import` that leaves behind the recording which `palpate open` made of a table."""
     fields = command_operation("import")[0].fields
-    told = {_OF_IMPORT.get(name, name): value for name, value in given.items()}
-    told["output"] = output
-    return typed("import", {name: value for name, value in told.items() if name in fields})
+    return typed("import", {k: v for k, v in {**given, "output": output}.items() if k in fields})
 
 
 def reconstruct_words(recording: str, model: Model) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import gzip
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from palpate import cli
 from palpate.importing.clocks import cross_correlated
 from palpate.importing.formats.text import seconds_of
 from palpate.mechanics.errors import FileError, OptionError, RecordingError
+from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
 
 RATE, TIP = 500.0, 0.004
 
@@ -464,8 +466,12 @@ def test_a_log_without_a_tracing_is_led_to_the_geometry_it_needs(tmp_path, world
     assert cli.main([*words, "--picture", "none"]) == 0
     told = capsys.readouterr().out.partition("written:")[2]
     assert all(flag in told for flag in ("--shape", "--slab", "--half-space")) and "palpate check" not in told
-    assert cli.main([*words, "--picture", "none", "--half-space"]) == 0
-    assert "palpate check" in capsys.readouterr().out
+    for known in (["--half-space"], ["--shape", "part.stl", "--unit", "mm", "--up=+x"]):
+        assert cli.main([*words, "--picture", "none", *known]) == 0
+        assert "palpate check" in capsys.readouterr().out
+    said = stated_geometry(pp.read_recording(tmp_path / "rec.csv"), GeometryOptions())
+    assert Path(said.shape).resolve() == Path("part.stl").resolve(), "as it was named from here"
+    assert (said.unit, said.up) == ("mm", "+x")
 
 
 def test_rows_slower_than_a_recording_are_put_on_a_clock_that_can_be_read(tmp_path, world):

@@ -100,6 +100,28 @@ def test_open_takes_every_flag_that_a_refusal_of_it_names(sources):
     assert not [each for each in met if each[0] not in taken]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "diagnose REC.csv",
+        "explore --robot --continue REC.csv -o more.csv --tip-radius 0.004",
+        "reconstruct REC.csv -o M",
+    ],
+)
+def test_what_is_not_traced_is_told_no_flag_that_the_command_has_not(words, tmp_path, monkeypatch, capsys):
+    """It said --shape FILE, of a diagnosis too: "'--shape' is not an option; did you mean --seed?"."""
+    monkeypatch.chdir(tmp_path)
+    raster((3, 3)).save("REC.csv")
+    assert main(words.split()) == 2
+    said = capsys.readouterr().err
+    quoted = re.compile(r"`palpate ([a-z]+)([^`]*)`")
+    assert {flag for _, rest in quoted.findall(said) for flag in FLAG.findall(rest)} >= {"--shape", "--slab"}
+    for command, rest in quoted.findall(said):
+        assert set(FLAG.findall(rest)) <= flags_of(command)
+    assert set(FLAG.findall(quoted.sub("", said))) <= flags_of(words.split()[0])
+    assert "[object]" in said, "what holds for every command"
+
+
 @pytest.fixture
 def reached(monkeypatch) -> type[Exception]:
     """What is raised where a command comes to the reconstruction."""
