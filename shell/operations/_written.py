@@ -20,8 +20,8 @@ _GEOMETRIES = {"shape", "slab_m", "half_space"}
 def open_words(given: Mapping[str, Any], more: Mapping[str, Any]) -> str:
     """The command `palpate open`. given: operands by name, and under "names" the column of each role; more:
     what is added, a column by its role ('-fz': the negative of what is fz now). One geometry takes the place
-    of another."""
-    dropped = _GEOMETRIES if _GEOMETRIES & set(more) else set()
+    of another, and of what was forced for want of it."""
+    dropped = {*_GEOMETRIES, "force"} if _GEOMETRIES & set(more) else set()
     told = {name: value for name, value in given.items() if name not in {*dropped, "names"}}
     for name, value in more.items():
         if name == "columns":
@@ -78,4 +78,5 @@ def _flag(flag: str, value: Any, repeated: bool) -> list[str]:
     if isinstance(value, list | tuple):
         each = [f"{one:g}" if isinstance(one, float) else str(one) for one in value]
         return [f"{flag} {shlex.quote(one)}" for one in (each if repeated else [",".join(each)])]
-    return [f"{flag} {shlex.quote(f'{value:g}' if isinstance(value, float) else str(value))}"]
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return [f"{flag}{'=' if text.startswith('-') else ' '}{shlex.quote(text)}"]
