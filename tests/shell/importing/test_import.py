@@ -502,3 +502,21 @@ def test_a_rate_ten_times_too_high_is_asked_about(tmp_path, shared_recordings):
     assert doubts(1000.0) == [] and doubts(500.0) == []
     (asked,) = doubts(10000.0)
     assert "from first touch to the peak" in asked
+
+
+def test_commas_that_both_part_and_point_are_asked_about(tmp_path, world):
+    """It offered fourteen columns, #1 to #14."""
+    rows = [",".join(f"{v:.4f}".replace(".", ",") for v in row) for row in
+            np.column_stack([world["t"], 1e3 * world["p"], world["f"]])]  # fmt: skip
+    (tmp_path / "log.csv").write_text("\n".join(["t [s],x [mm],y [mm],z [mm],fx [N],fy [N],fz [N]", *rows]))
+    with pytest.raises(RecordingError, match="decimal commas.*';'"):
+        pp.import_table(tmp_path / "log.csv", tip_radius_m=TIP)
+
+
+def test_free_air_alone_is_said_to_be_that(tmp_path, world):
+    """It asked whose force it was, and only who had said so was told that nothing was touched."""
+    air = 0.01 * np.random.default_rng(0).standard_normal(world["f"].shape)
+    held = dict(zip(["x", "y", "z", "fx", "fy", "fz"], np.column_stack([world["p"], air]).T, strict=True))
+    np.savez(tmp_path / "air.npz", t=world["t"], **held)
+    with pytest.raises(RecordingError, match="no contact"):
+        pp.import_table(tmp_path / "air.npz", tip_radius_m=TIP)
