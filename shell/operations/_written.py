@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from palpate.mechanics.options import flag_of
+from palpate.mechanics.recording.recording import Recording, stated_object
 from palpate.operations._declare import written
 from palpate.operations._run import command_operation
 from palpate.show.page import file_words
@@ -39,11 +42,26 @@ def import_words(given: Mapping[str, Any], output: str) -> str:
 def reconstruct_words(recording: str, model: Model) -> str:
     """The command `palpate reconstruct` of another recording of the object, by the geometry that a model was
     made by."""
+    return typed("reconstruct", {"recording": recording, **_geometry_of(model)}) + " -o MODEL"
+
+
+def with_geometry_of(model: Model, recording: Recording) -> Recording:
+    """A recording whose [object] states the geometry that a model was made by, where it states none."""
+    from palpate.reconstruction.geometry.stated import GeometryOptions, as_stated
+
+    stated, thing = as_stated(GeometryOptions(**_geometry_of(model))), recording.description.get("object", {})
+    if "shape" in stated:
+        stated["shape"] = os.path.abspath(stated["shape"])
+    object_ = {**stated, **thing} if not stated_object(recording) else thing
+    return replace(recording, description={**recording.description, "object": object_})
+
+
+def _geometry_of(model: Model) -> dict[str, Any]:
+    """Options of the geometry that a model was made by, as far as they are not the usual ones."""
     from palpate.reconstruction.geometry.stated import GeometryOptions
 
     made = (model.provenance.get("options") or {}).get("geometry") or {}
-    told = {name: value for name, value in made.items() if value != getattr(GeometryOptions(), name, value)}
-    return typed("reconstruct", {"recording": recording, **told}) + " -o MODEL"
+    return {name: value for name, value in made.items() if value != getattr(GeometryOptions(), name, value)}
 
 
 def typed(name: str, given: Mapping[str, Any]) -> str:
