@@ -300,7 +300,8 @@ def _concluded(
 ) -> Reconstruction:
     """The model, its interval as wide as the findings make it, and how it predicts places held out."""
     measured, surface = body.measured, body.surface
-    outcome = outcome_of(body.presses, fitted.modulus_pa, fitted.ci95_pa, fitted.misfit_n)
+    shape = "" if body.placed is None else body.placed.about.get("file", "")
+    outcome = outcome_of(body.presses, fitted.modulus_pa, fitted.ci95_pa, fitted.misfit_n, shape)
     measured = with_findings(measured, checked_results(outcome), options.force)
     interval = widened(fitted.modulus_pa, fitted.ci95_pa, measured.findings)
     clock.lap("modulus")

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from palpate.diagnosis.explore.felt import MESH_M, SURFACE_SPACING_M, felt
 from palpate.diagnosis.explore.goals import off_support, surface_error
 from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, patch_width, touch_sites, touch_solver
 from palpate.mechanics.elastic.solver import Solver
@@ -26,7 +27,6 @@ from palpate.reconstruction.shapes.fit import LEAST_TOUCHES
 from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s1_filter.signals import filtered_of
 from palpate.reconstruction.steps.s1_filter.tool_weight import ToolWeight
-from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
 from palpate.reconstruction.steps.s4_surface import (
     Surface,
@@ -40,8 +40,8 @@ from palpate.reconstruction.steps.s6_one_d import OneD, fit_robust, profiles
 from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
 from palpate.reconstruction.steps.s7_modulus.shape_error import compliance_covariance, shape_gradients
 
-MESH_M, SURFACE_EDGE_M = 0.016, 0.010
-"""Tetrahedra of the running estimate, and of its surface."""
+SURFACE_EDGE_M = 0.010
+"""Of the running estimate's surface."""
 LEAST_PRESSES = LEAST_TOUCHES
 _ALL_SHAPES_EVERY = 6
 _CONFIRMED_AFTER = 2
@@ -72,6 +72,7 @@ class ExplorationEstimate:
     choice_error_m: within which 95 % of the surface lay when all families were tried last.
     presses_at_choice: how many there were when the shape's family was chosen last. seconds: wall time of
     each step of this update. covariance: (p, p) 1/m^2, of the sites' compliances by the shape's uncertainty.
+    doubt: why the stated shape may be another object's, or "".
     """
 
     exploration: Measured | None = None
@@ -85,6 +86,7 @@ class ExplorationEstimate:
     choice_error_m: float = float("inf")
     seconds: dict[str, float] = field(default_factory=dict)
     covariance: np.ndarray | None = None
+    doubt: str = ""
 
     @property
     def surface_error_m(self) -> float:
@@ -123,25 +125,28 @@ def updated(
     """
     clock = Clock()
     filtered = filtered_of(recording, FilterOptions().cutoff_hz, near=before.weight)
-    options = ContactOptions(least_palpations=LEAST_PRESSES)
-    exploration = explore(recording, contact_options=options, spans=ContactSpans(filtered))
+    exploration, placed = felt(recording, LEAST_PRESSES, ContactSpans(filtered))
     clock.lap("presses")
-    surface, chosen_at, choice_error = _surface(exploration, before, within_m)
+    if placed is None:
+        surface, chosen_at, choice_error = _surface(exploration, before, within_m)
+    else:
+        surface, chosen_at, choice_error = placed.surface, len(exploration.presses), 0.0
     clock.lap("surface")
-    solved = _solved(surface, before, poisson_ratio)
+    solved = _solved(surface, before, poisson_ratio, None if placed is None else placed.mesh)
     clock.lap("mesh")
     touched = exploration.presses
     where = cast(solved.surface.vertices, solved.surface.triangles, touched.point, touched.contact_normal)
     presses = touched.on_surface(where.points, where.normals)
     sites, gradient = solved_sites(solved, where.points, where.normals, poisson_ratio)
     clock.lap("touch sites")
-    deviation = uncertainty_at(solved.solver.mesh, surface)
-    covariance = compliance_covariance(solved.solver, sites, deviation, gradient=gradient)
+    local, pose = (surface, None) if placed is None else (placed.by_itself, placed.pose)
+    deviation = uncertainty_at(solved.solver.mesh, local)
+    covariance = compliance_covariance(solved.solver, sites, deviation, pose=pose, gradient=gradient)
     fit = modulus_of(presses, sites, exploration.noise_n, covariance, seed)
     clock.lap("modulus")
     return ExplorationEstimate(
         exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, choice_error,
-        clock.laps, covariance,
+        clock.laps, covariance, "" if placed is None else placed.doubt,
     )  # fmt: skip
 
 
@@ -162,12 +167,12 @@ def _surface(
     known = before.surface
     again = known is None or count >= before.presses_at_choice + min(_ALL_SHAPES_EVERY, count // 3 + 1)
     if known is not None and not again:
-        options = SurfaceOptions(surface=known.method.removesuffix("+"), surface_spacing_m=0.004)
+        options = SurfaceOptions(surface=known.method.removesuffix("+"), surface_spacing_m=SURFACE_SPACING_M)
         same = reconstruct_surface(evidence, options)
         seems = within_m is not None and free_error(same) <= within_m < before.choice_error_m
         if not seems or count < before.presses_at_choice + _CONFIRMED_AFTER:
             return same, before.presses_at_choice, before.choice_error_m
-    chosen = reconstruct_surface(evidence, SurfaceOptions(surface_spacing_m=0.004))
+    chosen = reconstruct_surface(evidence, SurfaceOptions(surface_spacing_m=SURFACE_SPACING_M))
     return chosen, count, free_error(chosen)
 
 
@@ -177,13 +182,17 @@ def free_error(surface: Surface) -> float:
     return surface_error(surface.uncertainty_m[free], area)
 
 
-def _solved(surface: Surface, before: ExplorationEstimate, poisson_ratio: float) -> SolvedMesh:
+def _solved(
+    surface: Surface, before: ExplorationEstimate, poisson_ratio: float, mesh: TetMesh | None
+) -> SolvedMesh:
+    """mesh: of the surface, where it is known; None makes one."""
     kept = before.solved
     if kept is not None:
         off = distance(kept.surface.vertices, kept.surface.triangles, surface.vertices)
         if np.percentile(off, 95) < max(_MOVED_M, _MOVED_SHARE * free_error(surface)):
             return kept
-    mesh = mesh_surface(surface, MeshingOptions(mesh_size_m=MESH_M)).mesh
+    if mesh is None:
+        mesh = mesh_surface(surface, MeshingOptions(mesh_size_m=MESH_M)).mesh
     return SolvedMesh(surface, mesh, touch_solver(mesh, poisson_ratio, surface_edge_m=SURFACE_EDGE_M))
 
 

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from palpate.diagnosis.explore.candidates import TOUCH_ERROR_M, ReachOptions
 from palpate.diagnosis.explore.causes import Causes, causes_of
 from palpate.diagnosis.explore.estimate import LEAST_PRESSES, ExplorationEstimate, updated
+from palpate.diagnosis.explore.felt import felt
 from palpate.diagnosis.explore.goals import GoalOptions, GoalState
 from palpate.diagnosis.explore.modulus import modulus_beside
 from palpate.diagnosis.explore.segments import Instrument, Segment, check_joined, join, split
@@ -31,7 +32,6 @@ from palpate.mechanics.progress import Clock
 from palpate.mechanics.recording.recording import Recording, write_recording
 from palpate.mechanics.shape.nearest import distance
 from palpate.reconstruction.steps.s2_base import Boundary
-from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 
 Order = Callable[[np.ndarray, np.ndarray, np.ndarray, np.random.Generator], int]
 """(places (p, 3) m, touched (k, 3) m, here (3,) m, random numbers) to the number of the next place."""
@@ -135,7 +135,7 @@ class Explorer:
                 )
                 self._tested(before)
                 self._weigh()
-            self._trouble, self._air_hides = "", False
+            self._trouble, self._air_hides = self.estimate.doubt, False
         except (ContactError, SurfaceError, MeshError, DiagnosisError, ModelError) as error:
             self._trouble, self._air_hides = str(error), isinstance(error, LoudAirError)
         self._steps.append(Step(self._last, self.state))
@@ -180,7 +180,7 @@ class Explorer:
 
     def _trace_only(self) -> None:
         """The base's outline and the height of the highest touch, before there are presses enough."""
-        found = explore(self.recording, contact_options=ContactOptions(least_palpations=min(self._made, 1)))
+        found, _ = felt(self.recording, min(self._made, 1))
         self._base = found.boundary
         self._heights = found.boundary.height(found.presses.point) if len(found.presses) else np.zeros(0)
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from palpate.diagnosis.explore.felt import felt
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.plausible import SAMPLE_RATE, TIP_RADIUS
 from palpate.mechanics.recording.files import check_plausible
-from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.recording import Recording, stated_object
 from palpate.mechanics.recording.segments import STATED
 from palpate.mechanics.recording.segments import TimeSegment as Stretch
-from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions, explore
 
 AIR_S = 0.3
 """Before a first press, where a recording is cut that states no segments."""
@@ -137,6 +137,8 @@ def split(recording: Recording) -> tuple[Instrument, list[Segment]]:
     be found.
     """
     about = {name: getattr(recording, name) for name in ABOUT if getattr(recording, name) is not None}
+    if stated := stated_object(recording):
+        about["description"] = {"object": stated}
     instrument = Instrument(recording.tip_radius_m, recording.sample_rate_hz, about)
     t = recording.t
     stretches = recording.segments or _found(recording)
@@ -157,11 +159,13 @@ def split(recording: Recording) -> tuple[Instrument, list[Segment]]:
 
 
 def _found(recording: Recording) -> tuple[Stretch, ...]:
-    presses = explore(recording, contact_options=ContactOptions(least_palpations=1)).presses
+    found, _ = felt(recording, 1)
+    presses, (first, last) = found.presses, found.boundary.interval
+    traced = ["trace"] if last > first else []
     cuts = np.concatenate([
-        [recording.t[0], presses.onset_s[0] - AIR_S],
+        recording.t[:1], *([presses.onset_s[:1] - AIR_S] if traced else []),
         0.5 * (presses.end_s[:-1] + presses.onset_s[1:]),
-        [recording.t[-1]],
+        recording.t[-1:],
     ])  # fmt: skip
-    kinds = ["trace", *["press"] * len(presses)]
+    kinds = [*traced, *["press"] * len(presses)]
     return tuple(Stretch(k, float(a), float(b)) for k, a, b in zip(kinds, cuts[:-1], cuts[1:], strict=True))

@@ -127,7 +127,7 @@ def suggest(s: Situation) -> Suggestion:
 def _of_the_object(s: Situation) -> Suggestion:
     """The same, of what the object shows."""
     state, traced = s.state, s.kinds.count("trace")
-    if not traced:
+    if not traced and s.base is None:
         return Suggestion("trace", "the base's outline is not known: slide once around the object's foot")
     if s.air_hides and "free" not in s.kinds:
         why = "what the tool reads in the air hides the presses: wave and turn it there for three seconds"

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from palpate.diagnosis.explore.estimate import MESH_M, ExplorationEstimate, solved_sites
+from palpate.diagnosis.explore.estimate import ExplorationEstimate, solved_sites
+from palpate.diagnosis.explore.felt import MESH_M
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.forward.touches import reached, touches_of, unobservable_effects
 from palpate.diagnosis.instrument.free_air import free_air_of

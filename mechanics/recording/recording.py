@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import gzip
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -289,6 +290,32 @@ def base_model_of(recording: Recording) -> Path:
     return named_in(recording.path, str(recording.base_model.absolute()), RecordingError)
 
 
+GEOMETRY = ("shape", "shape_unit", "shape_pose", "shape_up", "shape_sink_m", "slab_m", "half_space")
+"""Keys of [object] that say what and where the object is."""
+
+
+def stated_object(recording: Recording) -> dict[str, Any]:
+    """What the recording's [object] says of its geometry, by key (GEOMETRY); a shape's file as seen from
+    here."""
+    thing = recording.description.get("object", {})
+    stated = {key: thing[key] for key in GEOMETRY if key in thing} if isinstance(thing, Mapping) else {}
+    if "shape" in stated and recording.path is not None:
+        stated["shape"] = str(recording.path.parent / str(stated["shape"]))
+    return stated
+
+
+def named_beside(path: Path, stated: Mapping[str, Any]) -> dict[str, Any]:
+    """What is stated of an object, its files as seen from here, as a description at `path` names them."""
+
+    def from_there(file: str) -> str:
+        try:
+            return os.path.relpath(file, path.parent)
+        except ValueError:  # on another drive
+            return os.path.abspath(file)
+
+    return {**stated, **{key: from_there(str(stated[key])) for key in ("shape", "model") if key in stated}}
+
+
 def _optional_float(value: Any) -> float | None:
     return None if value is None else float(value)
 
@@ -305,6 +332,7 @@ def write_recording(
     check_target(description, kind)
     write_samples(path, recording, ["%.4f"] + ["%.9f"] * 3 + ["%.6f"] * 3 + ["%.7f"] * 4)
     table = description_table(recording)
+    table["object"] = named_beside(path, table["object"])
     if truth is not None:
         table["truth"] = dict(truth)
     # each segment under a header of its own, last: a description begins with [recording]
@@ -346,6 +374,7 @@ def description_table(recording: Recording) -> dict[str, Any]:
         table["object"]["poisson_ratio"] = recording.poisson_ratio
     if recording.base_model is not None:
         table["object"]["model"] = str(recording.base_model)
+    table["object"] |= stated_object(recording)
     if "tip" in (tool := recording.description.get("tool", {})):
         table["tool"]["tip"] = tool["tip"]
     if recording.tip_assumed:

@@ -147,24 +147,29 @@ _MISFIT = 0.5
 @dataclass(frozen=True)
 class ReconstructionOutcome:
     """What is looked at of a reconstruction: modulus and its 95 % interval, Pa; of each press (k,) the misfit
-    rms (NaN where unknown) and the force rms, N, and first touch, s."""
+    rms (NaN where unknown) and the force rms, N, and first touch, s; name of the shape's file, '' of none."""
 
     modulus_pa: float
     ci95_pa: tuple[float, float]
     misfit_n: np.ndarray
     force_n: np.ndarray
     onset_s: np.ndarray
+    shape: str = ""
 
 
 def outcome_of(
-    presses: Presses, modulus_pa: float, ci95_pa: tuple[float, float], misfit_n: np.ndarray | None
+    presses: Presses,
+    modulus_pa: float,
+    ci95_pa: tuple[float, float],
+    misfit_n: np.ndarray | None,
+    shape: str = "",
 ) -> ReconstructionOutcome:
     """Of fitted presses; misfit_n: (p,) N rms, None by the paper's method, which states none."""
     net, touched = presses.net, presses.press[presses.counted]
     squared = np.bincount(touched, (net.force[presses.counted] ** 2).sum(axis=1), len(presses))
     force = np.sqrt(squared / np.maximum(np.bincount(touched, minlength=len(presses)), 1))
     misfit = np.full(len(presses), np.nan) if misfit_n is None else misfit_n
-    return ReconstructionOutcome(modulus_pa, ci95_pa, misfit, force, presses.onset_s)
+    return ReconstructionOutcome(modulus_pa, ci95_pa, misfit, force, presses.onset_s, shape)
 
 
 def outcome(result: ReconstructionOutcome) -> Iterator[Finding]:
@@ -199,11 +204,17 @@ def outcome(result: ReconstructionOutcome) -> Iterator[Finding]:
         return
     worst = int(np.flatnonzero(known)[np.argmax(share)])
     at = float(result.onset_s[worst])
+    look = "see the other findings"
+    if result.shape:
+        look = (
+            f"check that '{result.shape}' stands as the object did: --up (in a TOML shape_up) says which way "
+            "is up in its file, +x, -z, ..."
+        )
     yield Finding(
         "misfit",
         f"the model misses half of the presses by more than {100 * typical:.0f} % of their force (rms)",
         f"{known.sum()} presses; 5 to 20 % is usual",
-        "see the other findings; `palpate diagnose` names what the model lacks",
+        f"{look}; `palpate diagnose` names what the model lacks",
         float(typical),
         np.inf,
         (at - 0.2, at + 1.0),

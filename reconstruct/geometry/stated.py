@@ -8,7 +8,7 @@ Which geometry is known: by options, or by what the recording says of its object
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from palpate.mechanics.frames import support_axes, tangents
 from palpate.mechanics.model.files import read_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.options import option
-from palpate.mechanics.recording.recording import Recording, base_model_of
+from palpate.mechanics.recording.recording import GEOMETRY, Recording, base_model_of, stated_object
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s2_base import Boundary
@@ -177,28 +177,24 @@ class GeometryOptions:
         return "shape" if self.shape else flat
 
 
-_STATED = {
-    "shape": "shape",
-    "shape_unit": "unit",
-    "shape_pose": "pose",
-    "shape_up": "up",
-    "shape_sink_m": "sink_m",
-    "slab_m": "slab_m",
-    "half_space": "half_space",
-}
+_STATED = {key: "shape" if key == "shape" else key.removeprefix("shape_") for key in GEOMETRY}
 """Keys of a recording's [object], and the options that they stand for."""
+
+
+def as_stated(options: GeometryOptions) -> dict[str, Any]:
+    """The options that say something, as a recording's [object] says it."""
+    usual = GeometryOptions()
+    said = {key: getattr(options, name) for key, name in _STATED.items()}
+    return {key: value for key, value in said.items() if value != getattr(usual, _STATED[key])}
 
 
 def stated_geometry(recording: Recording, options: GeometryOptions) -> GeometryOptions:
     """The options, or what the recording's [object] says where they give no geometry."""
-    thing = recording.description.get("object", {})
-    if options.known or not isinstance(thing, Mapping):
+    if options.known:
         return options
-    keys: dict[str, Any] = {option: thing[key] for key, option in _STATED.items() if key in thing}
-    if "shape" in keys and recording.path is not None:
-        keys["shape"] = str(recording.path.parent / str(keys["shape"]))
+    stated = {_STATED[key]: value for key, value in stated_object(recording).items()}
     try:
-        return dataclasses.replace(options, **keys)
+        return dataclasses.replace(options, **stated)
     except TypeError as error:
         raise OptionError(
             f"[object] of '{recording.name}' holds a value of the wrong kind: {error}"

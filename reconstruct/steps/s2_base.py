@@ -24,8 +24,11 @@ from palpate.reconstruction.shapes.outline import (
     resampled,
 )
 
-UNTRACED = "say what is known of the object: --shape FILE, --slab M or --half-space"
-"""What goes on without a tracing."""
+UNTRACED = (
+    "say what is known of the object in [object] of its TOML (shape, slab_m or half_space), or by "
+    "`palpate open REC --shape FILE`, `palpate open REC --slab M` or `palpate open REC --half-space`"
+)
+"""What goes on without a tracing, whatever command came upon it."""
 
 
 @dataclass(frozen=True)

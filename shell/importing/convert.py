@@ -26,6 +26,7 @@ from palpate.mechanics.plausible import COLUMN, EXPLORATION
 from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.checks.samples import Samples
 from palpate.reconstruction.checks.units import measured
+from palpate.reconstruction.steps.s1_filter.noise import white_noise_std
 from palpate.words import mm
 
 GRAVITY_M_PER_S2 = 9.80665
@@ -86,6 +87,10 @@ def one_axis(
     return position * [1.0, 1.0, float(travel)], load > 0, signs.odds
 
 
+_OF_AIR = 6.0
+"""Standard deviations of its noise that no force in free air leaves its median by."""
+
+
 def is_on_tool(position: np.ndarray, force: np.ndarray, said: Said, notes: list[str]) -> tuple[bool, float]:
     """(whether the force is that on the tool, odds): as said, else by what a solid does. Raises Unclear."""
     sense = force_sense(position, force)
@@ -100,6 +105,12 @@ def is_on_tool(position: np.ndarray, force: np.ndarray, said: Said, notes: list[
         notes.append(f"the force is that on the {said.force_on}, as stated{turned}")
         return said.force_on == "tool", MOST_ODDS
     if not sense.sure:
+        noise_n = white_noise_std(force)
+        if np.abs(force - np.median(force, axis=0)).max() < _OF_AIR * noise_n:
+            raise RecordingError(
+                f"no contact: in {len(force)} rows no force rises above its noise ({noise_n:.2g} N an axis): "
+                "record presses from the air and back, or say which columns hold the force (--column fz=NAME)"
+            )
         raise Unclear(
             f"whether the force is that on the tool or on the object cannot be determined from "
             f"{len(force)} rows "

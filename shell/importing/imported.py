@@ -16,7 +16,7 @@ from palpate.importing.convert import Understood
 from palpate.mechanics.disk.toml_text import dump_toml
 from palpate.mechanics.disk.writing import Kind, atomic_file
 from palpate.mechanics.recording.files import DESCRIPTION, samples_path
-from palpate.mechanics.recording.recording import Recording, write_samples
+from palpate.mechanics.recording.recording import Recording, named_beside, write_samples
 from palpate.mechanics.result import Result
 from palpate.show.page import subplots
 
@@ -80,7 +80,7 @@ def write_imported(
     table = {
         "recording": about,
         "tool": {"tip_radius_m": recording.tip_radius_m, **recording.description["tool"]},
-        "object": {"name": recording.object_name, **{k: v for k, v in thing.items() if k != "name"}},
+        "object": named_beside(path, {**thing, "name": recording.object_name}),
         "import": {
             "files": sources,
             "columns": {role: str(c).partition(" = ")[2] for role, c in understood.columns.items()},

@@ -161,6 +161,8 @@ def read_mapping(path: Path | str) -> dict[str, Any]:
         found["tare_s"] = (float(held["tare"].get("start_s", 0.0)), float(held["tare"]["end_s"]))
     if "object" in held:
         found["thing"] = held["object"]
+        if "shape" in held["object"]:
+            found["thing"] |= {"shape": str(path.parent / held["object"]["shape"])}
     return found
 
 
@@ -216,6 +218,12 @@ def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
     found = told_columns(tables, said)
     for kind, roles in (("position", "xyz"), ("force", ("fx", "fy", "fz"))):
         missing = [role for role in roles if role not in found]
+        if missing and any(map(_split_at_decimals, tables)):
+            raise RecordingError(
+                "decimal commas? Every second column holds whole numbers alone, and the separator is a comma "
+                "too, so where a number ends cannot be told: write the file with ';' or tabs between its "
+                "columns, or with decimal points"
+            )
         if missing:
             of_curve = "depth" if kind == "position" else "load"
             alone = f", or of a machine's curve --column {of_curve}=NAME" * (len(missing) == len(roles))
@@ -226,6 +234,14 @@ def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
     if any(q in found for q in ROLES[7:]) and not all(q in found for q in ROLES[7:]):
         found = {role: column for role, column in found.items() if not role.startswith("q")}
     return found
+
+
+def _split_at_decimals(table: Table) -> bool:
+    """Whether the columns have no names, and every second one may be the decimals of the one before it."""
+    decimals = np.array([*table.columns.values()][1::2])
+    whole = (decimals >= 0) & (decimals == np.floor(decimals))
+    unnamed = all(re.fullmatch(r"#\d+", name) for name in table.columns)
+    return unnamed and len(table.columns) % 2 == 0 and len(decimals) > 2 and bool(whole.all())
 
 
 def told_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:

@@ -283,8 +283,10 @@ def _applied(own: Diagnosis, into: str) -> list[str]:
 def _corrected(own: Diagnosis, into: str) -> list[str]:
     """What was written, and what was not taken off."""
     from palpate.diagnosis.apply import unsure
+    from palpate.operations._written import with_geometry_of
 
-    own.corrected().save(into)
+    assert own.model is not None, "of presses on a model"
+    with_geometry_of(own.model, own.corrected()).save(into)
     return [
         *(
             f"{name.replace('_', ' ')}: smaller than twice its own error, not taken off"

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from palpate.mechanics.contact.tip import other_tip
 from palpate.mechanics.errors import OptionError, RecordingError
 from palpate.operations._call import Call
-from palpate.operations._declare import argument, operation, option
+from palpate.operations._declare import Given, argument, operation, option
 from palpate.operations._shared import (
     SAMPLES,
     ClockOfRows,
@@ -30,6 +30,7 @@ from palpate.operations._shared import (
     seconds,
 )
 from palpate.operations._to_argparse import vector
+from palpate.reconstruction.geometry.stated import GeometryOptions, as_stated
 from palpate.words import typed_word
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def _tare(text: str) -> tuple[float, ...]:
     return tuple(seconds(part, "--tare") for part in parts)
 
 
-@operation(progress=False)
+@operation(common="shape unit slab_m", progress=False)
 def import_table(
     *files: Annotated[
         str | Path, argument("file, or folder of a ROS 2 bag", metavar="FILE", count="+", reads=True)
@@ -105,12 +106,6 @@ def import_table(
         Mapping[str, Any] | None, option("what [object] of the recording is to say", only="python")
     ] = None,
     name: Annotated[str | None, option("name of the object", only="command", advanced=True)] = None,
-    slab: Annotated[
-        float | None, option("thickness, if the object is a slab", unit="m", only="command", advanced=True)
-    ] = None,
-    half_space: Annotated[
-        bool, option("the object is deep and wide compared with the contacts", only="command", advanced=True)
-    ] = False,
     picture: Annotated[
         str | None,
         option(
@@ -122,6 +117,7 @@ def import_table(
         ),
     ] = None,
     dry_run: Annotated[bool, option("picture and summary only: write no recording", only="command")] = False,
+    geometry: Given[GeometryOptions],
     call: Call,
 ) -> Imported:
     """What other programs' files hold, as a recording: CSV, TSV, text, spreadsheets, NumPy, MATLAB, HDF5,
@@ -138,7 +134,6 @@ def import_table(
 
     if call.command and output is None and not dry_run:
         raise OptionError("-o REC is missing: name the recording to write, or give --dry-run")
-    of_flags = {"name": name, "slab_m": slab, "half_space": half_space}
     said: dict[str, Any] = {
         "columns": named(columns, "columns"),
         "units": named(units, "units"),
@@ -153,7 +148,11 @@ def import_table(
         "offset_s": offset_s,
         "clock": clock,
         "rate_hz": rate_hz,
-        "thing": {**(thing or {}), **{key: value for key, value in of_flags.items() if value}},
+        "thing": {
+            **(thing or {}),
+            **({"name": name} if name else {}),
+            **as_stated(GeometryOptions(**geometry)),
+        },
     }
     held = {} if mapping is None else read_mapping(mapping)
     for key, value in said.items():  # counts before what a mapping file says
@@ -206,7 +205,7 @@ def _beside(output: str | None) -> str:
 
 
 @operation(like=import_table, progress=False)
-def read_table(*files: Any, **said: Any) -> Recording:
+def read_table(*files: Any, geometry: Mapping[str, Any], **said: Any) -> Recording:
     """The recording in other programs' files, in m, s and N, as `import_table` reads it, which also tells and
     draws what it understood. Raises RecordingError."""
-    return import_table(*files, **said).recording
+    return import_table(*files, **said, **geometry).recording

@@ -99,10 +99,18 @@ def story_of(result: Result, **more: Any) -> Story:
 
 
 def next_lines(result: Result, **more: Any) -> list[str]:
-    """What a terminal says last: what to do with a result, a step a line; nothing where its story says none.
-    more: what its kind's `story` takes beside."""
+    """What a terminal says last: what to do with a result, a step a line, and commands that follow one
+    another a line each; nothing where its story says none. more: what its kind's `story` takes beside."""
     steps = steps_of(story_of(result, **more)) if _has_story(result) else []
-    return [f"{'next:' if k == 0 else '     '} {step.replace('`', '')}" for k, step in enumerate(steps)]
+    lines = []
+    for step in steps:
+        words, _, commands = step.partition("`") if _THEN in step else (step, "", "")
+        lines += [words.rstrip(), *(f"  {each}" for each in commands.split(_THEN) if each)]
+    return [f"{'next:' if k == 0 else '     '} {line.replace('`', '')}" for k, line in enumerate(lines)]
+
+
+_THEN = "`, `"
+"""Between two commands of a step."""
 
 
 def _has_story(result: Result) -> bool:

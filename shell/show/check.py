@@ -9,7 +9,7 @@ import numpy as np
 
 from palpate.mechanics.recording.recording import Recording
 from palpate.operations._written import open_words
-from palpate.reconstruction.checks.finding import Checkup, Finding, Way
+from palpate.reconstruction.checks.finding import OF_A_KNOWN_OBJECT, Checkup, Finding, Way
 from palpate.reconstruction.checks.samples import CHANNELS
 from palpate.show import story as say
 from palpate.show.colours import COLOURS
@@ -124,6 +124,8 @@ def _meaning(result: Checkup) -> str:
     if not result.findings:
         return "Nothing was found that would move the modulus beyond its interval."
     if any(f.grave for f in result.findings):
+        if any(way in OF_A_KNOWN_OBJECT for finding in result.grave for way in finding.ways):
+            return "No model is made of it until it is said what the object is."
         return "The model could be another object's: `palpate reconstruct` refuses this without --force."
     return "The modulus's interval is widened by what was found; the model can be made as it is."
 

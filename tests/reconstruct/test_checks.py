@@ -165,6 +165,13 @@ def test_an_outcome_that_is_none_is_an_error(modulus, interval, misfit, name):
     assert not list(outcome(ReconstructionOutcome(30e3, (29e3, 31e3), 0.02 * ones, ones, ones)))
 
 
+def test_a_misfit_of_a_given_shape_asks_which_way_is_up():
+    """It sent to other findings, which there were not."""
+    ones = np.ones(5)
+    (found,) = outcome(ReconstructionOutcome(30e3, (29e3, 31e3), 0.9 * ones, ones, ones, "part.stl"))
+    assert "'part.stl'" in found.todo and "--up" in found.todo and "findings" not in found.todo
+
+
 def test_the_probability_of_a_tail_is_the_binomial_one():
     assert decades_of_tail(3, 3, 0.01) == pytest.approx(6.0)
     assert decades_of_tail(0, 10, 0.5) == 0.0

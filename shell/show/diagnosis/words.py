@@ -199,7 +199,7 @@ def where(result: Diagnosis) -> tuple[str, str, str]:
     if axis.share < LITTLE:
         most = f"It depends most on {AXIS_WORDS[axis.axis]}, which explains {percent(axis.share)} of it."
         return question, "Everywhere alike", f"{most} {there}"
-    chance = "" if axis.p < 0.05 else " That may be chance."
+    chance = "" if axis.p < 0.05 else " Chance alone would often give such a share."
     if axis.axis != "direction":
         text = f"{percent(axis.share)} of the difference depends on it.{chance} {there}"
         return question, f"It changes with {AXIS_WORDS[axis.axis]}", text

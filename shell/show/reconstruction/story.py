@@ -318,11 +318,16 @@ def as_far_as_believed(result: Reconstruction, ways: list[str], feel: str, left_
 
 def mending(result: Reconstruction) -> list[Way]:
     """Ways to an answer that can be relied on: another geometry where touches lie off the flat one that was
-    given, a field of the modulus where one is beaten by a 1D model."""
+    given, another way up of a shape's file whose model does not predict, a field of the modulus where one is
+    beaten by a 1D model."""
     ways, held_out = [], result.held_out
+    made = result.model.provenance["options"]
     if result.placed is not None and result.placed.doubt:
         ways += [way for way in OF_A_KNOWN_OBJECT if "shape" in way.options]
-    one = result.model.provenance["options"]["modulus_field"]["field"] == "homogeneous"
+    elif result.doubt and result.placed is not None and "file" in result.placed.about:
+        up = "-z" if made["geometry"]["up"] != "-z" else "+z"
+        ways.append(Way(f"its file stands another way, here {up} up", {"up": up}))
+    one = made["modulus_field"]["field"] == "homogeneous"
     if one and held_out is not None and held_out.beaten_by:
         ways.append(Way("let the modulus differ from place to place", {"field": "auto"}))
     return ways

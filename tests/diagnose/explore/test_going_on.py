@@ -5,10 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from palpate.diagnosis.explore.explorer import Explorer
 from palpate.diagnosis.explore.segments import Instrument, Segment, join, split
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.recording.recording import read_recording, write_recording
 from palpate.mechanics.recording.segments import TimeSegment as Stretch
+
+from ...reconstruct.exploration_of_cylinder import HEIGHT, RADIUS, Frame, explore_cylinder
 
 
 def _rows(kind, n=400, at=0.0):
@@ -51,3 +54,23 @@ def test_a_recording_says_what_is_wrong_with_its_segments(explored):
         dataclasses.replace(recording, segments=(Stretch("press", 2.0, 1.0),))
     with pytest.raises(RecordingError, match="order of time"):
         split(dataclasses.replace(recording, segments=recording.segments[::-1]))
+
+
+@pytest.mark.slow
+def test_an_untraced_object_of_a_stated_shape_is_explored_on(tmp_path, monkeypatch):
+    """It ended in "no boundary phase found", whatever [object] said, and what it wrote forgot the shape."""
+    trimesh = pytest.importorskip("trimesh")
+    monkeypatch.chdir(tmp_path)
+    body = trimesh.creation.cylinder(1e3 * RADIUS, 1e3 * HEIGHT, sections=90)
+    body.apply_translation((0, 0, 500 * HEIGHT)).export("part.stl")
+    upright = Frame(np.eye(3), np.array([0.08, -0.05, 0.03]))  # it has no other sign of which end is up
+    felt, onsets = explore_cylinder(frame=upright, without_phase=True, state_phase=False)
+    felt = dataclasses.replace(felt, description={"object": {"shape": "part.stl", "shape_unit": "mm"}})
+    explorer = Explorer.going_on(read_recording(felt.save("felt.csv.gz")))
+    assert explorer.state.trouble == "" and explorer.state.presses == len(onsets)
+    assert explorer.state.surface == "known shape"
+    assert explorer.state.modulus_pa == pytest.approx(16e3, rel=0.1), "of the law that it was pressed by"
+    assert explorer.suggest().kind in ("press", "stop"), "no tracing is asked for of what is known"
+    (tmp_path / "more").mkdir()
+    again = Explorer.going_on(read_recording(explorer.save("more/more.csv.gz")))
+    assert again.state.surface == "known shape" and again.state.presses == len(onsets)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import gzip
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from palpate import cli
 from palpate.importing.clocks import cross_correlated
 from palpate.importing.formats.text import seconds_of
 from palpate.mechanics.errors import FileError, OptionError, RecordingError
+from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
 
 RATE, TIP = 500.0, 0.004
 
@@ -464,8 +466,12 @@ def test_a_log_without_a_tracing_is_led_to_the_geometry_it_needs(tmp_path, world
     assert cli.main([*words, "--picture", "none"]) == 0
     told = capsys.readouterr().out.partition("written:")[2]
     assert all(flag in told for flag in ("--shape", "--slab", "--half-space")) and "palpate check" not in told
-    assert cli.main([*words, "--picture", "none", "--half-space"]) == 0
-    assert "palpate check" in capsys.readouterr().out
+    for known in (["--half-space"], ["--shape", "part.stl", "--unit", "mm", "--up=+x"]):
+        assert cli.main([*words, "--picture", "none", *known]) == 0
+        assert "palpate check" in capsys.readouterr().out
+    said = stated_geometry(pp.read_recording(tmp_path / "rec.csv"), GeometryOptions())
+    assert Path(said.shape).resolve() == Path("part.stl").resolve(), "as it was named from here"
+    assert (said.unit, said.up) == ("mm", "+x")
 
 
 def test_rows_slower_than_a_recording_are_put_on_a_clock_that_can_be_read(tmp_path, world):
@@ -496,3 +502,21 @@ def test_a_rate_ten_times_too_high_is_asked_about(tmp_path, shared_recordings):
     assert doubts(1000.0) == [] and doubts(500.0) == []
     (asked,) = doubts(10000.0)
     assert "from first touch to the peak" in asked
+
+
+def test_commas_that_both_part_and_point_are_asked_about(tmp_path, world):
+    """It offered fourteen columns, #1 to #14."""
+    rows = [",".join(f"{v:.4f}".replace(".", ",") for v in row) for row in
+            np.column_stack([world["t"], 1e3 * world["p"], world["f"]])]  # fmt: skip
+    (tmp_path / "log.csv").write_text("\n".join(["t [s],x [mm],y [mm],z [mm],fx [N],fy [N],fz [N]", *rows]))
+    with pytest.raises(RecordingError, match="decimal commas.*';'"):
+        pp.import_table(tmp_path / "log.csv", tip_radius_m=TIP)
+
+
+def test_free_air_alone_is_said_to_be_that(tmp_path, world):
+    """It asked whose force it was, and only who had said so was told that nothing was touched."""
+    air = 0.01 * np.random.default_rng(0).standard_normal(world["f"].shape)
+    held = dict(zip(["x", "y", "z", "fx", "fy", "fz"], np.column_stack([world["p"], air]).T, strict=True))
+    np.savez(tmp_path / "air.npz", t=world["t"], **held)
+    with pytest.raises(RecordingError, match="no contact"):
+        pp.import_table(tmp_path / "air.npz", tip_radius_m=TIP)

@@ -13,8 +13,10 @@ import pytest
 
 import palpate as pp
 from palpate.cli import main
-from palpate.operations._written import reconstruct_words
+from palpate.operations._written import reconstruct_words, with_geometry_of
+from palpate.reconstruction.geometry.stated import GeometryOptions, stated_geometry
 
+from ...reconstruct.flat_ground import raster
 from ..importing.test_meaning import press, write
 
 
@@ -183,3 +185,14 @@ def test_a_corrected_recording_is_reconstructed_by_the_geometry_that_is_known():
     }
     words = reconstruct_words("CLEAN.csv.gz", model.replaced(provenance=made))
     assert words == "palpate reconstruct CLEAN.csv.gz --shape 'my part.stl' --unit mm -o MODEL"
+
+
+def test_a_corrected_recording_states_the_geometry_that_is_known(tmp_path, monkeypatch):
+    """Its check-up was grave again, "no base", and a diagnosis of it was refused."""
+    monkeypatch.chdir(tmp_path)
+    made = {"options": {"geometry": {"shape": "part.stl", "unit": "mm", "pose": "auto"}}}
+    model = pp.load("demo").replaced(provenance=made)
+    (tmp_path / "kept").mkdir()
+    with_geometry_of(model, raster((2, 2))).save("kept/CLEAN.csv.gz")
+    said = stated_geometry(pp.read_recording("kept/CLEAN.csv.gz"), GeometryOptions())
+    assert Path(said.shape).resolve() == (tmp_path / "part.stl").resolve() and said.unit == "mm"

@@ -7,6 +7,7 @@ import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from palpate.operations._written import import_words, open_words
 from palpate.reconstruction.checks.registry import looked_at
 from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors
 from palpate.show import next_lines
+from palpate.show.reconstruction.story import mending
 
 from ...conftest import REPOSITORY, modules_of
 from ...reconstruct.exploration_of_cylinder import explore_cylinder
@@ -98,6 +100,28 @@ def test_open_takes_every_flag_that_a_refusal_of_it_names(sources):
                 met |= {(flag, module) for flag in FLAG.findall(words)}
     assert {"--slab", "--shape", "--half-space", "--poisson-ratio", "--sink", "--rate"} <= {f for f, _ in met}
     assert not [each for each in met if each[0] not in taken]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "diagnose REC.csv",
+        "explore --robot --continue REC.csv -o more.csv --tip-radius 0.004",
+        "reconstruct REC.csv -o M",
+    ],
+)
+def test_what_is_not_traced_is_told_no_flag_that_the_command_has_not(words, tmp_path, monkeypatch, capsys):
+    """It said --shape FILE, of a diagnosis too: "'--shape' is not an option; did you mean --seed?"."""
+    monkeypatch.chdir(tmp_path)
+    raster((3, 3)).save("REC.csv")
+    assert main(words.split()) == 2
+    said = capsys.readouterr().err
+    quoted = re.compile(r"`palpate ([a-z]+)([^`]*)`")
+    assert {flag for _, rest in quoted.findall(said) for flag in FLAG.findall(rest)} >= {"--shape", "--slab"}
+    for command, rest in quoted.findall(said):
+        assert set(FLAG.findall(rest)) <= flags_of(command)
+    assert set(FLAG.findall(quoted.sub("", said))) <= flags_of(words.split()[0])
+    assert "[object]" in said, "what holds for every command"
 
 
 @pytest.fixture
@@ -262,8 +286,31 @@ def test_what_does_not_predict_is_kept_before_it_is_looked_into(tmp_path, monkey
     robots_log(tmp_path)
     monkeypatch.setattr(HeldOutErrors, "doubt", "the model does not predict")
     assert main([*shlex.split(f"open robot.csv --half-space --report none --tip-radius {TIP_M}")]) == 1
-    (steps,) = (s for s in capsys.readouterr().out.splitlines() if "--model MODEL" in s)
-    assert -1 < steps.find("--output MODEL") < steps.index("--model MODEL")
+    said = capsys.readouterr().out.partition("next:")[2]
+    commands = [line.strip() for line in said.splitlines() if line.strip().startswith("palpate ")]
+    assert [c.split()[1] for c in commands] == ["open", "import", "diagnose"], "a line each, to be pasted"
+    assert "--output MODEL" in commands[0] and "--model MODEL" in commands[2]
+
+
+def test_a_shape_whose_model_does_not_predict_is_tried_another_way_up():
+    """Upside down it said 42 kPa for 17, and nothing of --up."""
+    result = SimpleNamespace(
+        placed=SimpleNamespace(doubt="", about={"file": "part.stl"}),
+        doubt="a 1D model predicts better",
+        held_out=None,
+        model=SimpleNamespace(
+            provenance={"options": {"geometry": {"up": "+z"}, "modulus_field": {"field": "auto"}}}
+        ),
+    )
+    (way,) = mending(result)
+    words = open_words({"files": ("REC.csv",), "shape": "part.stl", "unit": "mm"}, way.options)
+    parsed = parser_of("open").parse_args(shlex.split(words)[2:])
+    assert parsed.up == "-z" and parsed.shape == "part.stl"
+
+
+def test_a_geometry_that_is_named_takes_the_place_of_force():
+    words = open_words({"files": ("REC.csv",), "half_space": True, "force": True}, {"shape": "SHAPE.stl"})
+    assert words == "palpate open REC.csv --shape SHAPE.stl"
 
 
 def test_what_says_nothing_of_such_a_file_is_refused(tmp_path):
