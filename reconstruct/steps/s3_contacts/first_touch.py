@@ -40,6 +40,8 @@ _LEAST_SPAN_S = 0.05
 _LEANED_M = 5e-5
 """A tracing leans deeper into the object's foot: by hand 0.1 to 0.6 mm, and the least of 60 simulated hands
 was pushed as at 0.06 mm."""
+_NOTICED_N = 1e-3
+"""What a press exceeds by itself, in a recording without noise, is not asked for."""
 _SLIDE = 8.0
 """Tip radii: contacts that go further are slides."""
 _TIPS_M = (1e-3, 0.02)
@@ -100,6 +102,8 @@ class ContactSpans:
         except NoBaseError:
             raise
         except ContactError as error:
+            if stated and (more := how_to_go_on(self.recording)):
+                raise ContactError(f"{error}; {more}") from error
             if stated:
                 raise
             raise NoBaseError(f"{error}; if none was traced, {UNTRACED}") from error
@@ -290,7 +294,8 @@ def _too_few(
 ) -> ContactError:
     """The error of too few presses. counts: of presses and of contacts. below: they lie below the support."""
     why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
-    hint = f"press at more places, and until the force is above {threshold_n:.2g} N"
+    felt = f", and until the force is above {1e3 * threshold_n:.2g} mN" if threshold_n > _NOTICED_N else ""
+    hint = how_to_go_on(recording) or f"press at more places{felt}"
     if request.method == "paper":
         hint = "lower --contact-threshold or press harder"
     elif below:
@@ -303,6 +308,13 @@ def _too_few(
         f"{request.least_presses} {'is' if request.least_presses == 1 else 'are'} needed: {hint}",
         0 if below else counts[0],
     )
+
+
+def how_to_go_on(recording: Recording) -> str:
+    """How an exploration whose file this is goes on; '' of another recording."""
+    if recording.path is None or not recording.segments:
+        return ""
+    return f"go on exploring: the same `palpate explore` with --continue {recording.path}"
 
 
 def _check_loudness(
