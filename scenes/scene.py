@@ -31,6 +31,7 @@ from palpate.mechanics.disk.reading import named_in, read_toml
 from palpate.mechanics.disk.schema import FileKey, Listed, Schema, check_table
 from palpate.mechanics.disk.surface_files import SUFFIXES, is_surface_file
 from palpate.mechanics.errors import OptionError, SceneError
+from palpate.mechanics.model.files import models_in
 from palpate.mechanics.model.material import BALL, Ball
 from palpate.mechanics.names import unknown
 from palpate.mechanics.plausible import PART_MODULUS, POISSON_RATIO, SPHERE, TIP_RADIUS, YOUNG_MODULUS
@@ -144,6 +145,8 @@ def load_scene(name: str | Path) -> Scene:
     Raises SceneError that lists what is allowed.
     """
     path, embedded = Path(name), FOLDER / f"{name}.toml"
+    if path.name == "model.toml" and path.is_file():
+        raise SceneError(f"'{path}' is a part of a MODEL: name its folder, {path.parent}")
     # a MODEL goes before a scene of its name; any other folder does not
     if path.is_dir() and ((path / "model.toml").is_file() or not embedded.is_file()):
         return Scene(path.name, "model", str(path.resolve()), title=_title_of(path))
@@ -163,8 +166,9 @@ def load_scene(name: str | Path) -> Scene:
     if str(name) in PHANTOMS:
         return Scene(path.stem, "phantom", str(name), title=path.stem)
     missing = "" if path.exists() else f"there is no file or folder {path}, and "
+    beside = models_in(path.parent) if path.is_file() else []
     raise SceneError(
-        missing
+        (f"'{beside[0]}', beside {path.name}, is a MODEL; " if beside else missing)
         + unknown(
             str(name),
             "scene",

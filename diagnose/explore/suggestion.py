@@ -162,7 +162,7 @@ def _first(s: Situation, base: Boundary) -> Suggestion:
     point, normal = places[s.state.made % len(places)] if height is not None else places[0]
     what = "how high the object is" if height is None else "where its sides and its top are"
     return Suggestion(
-        "press", f"nothing is known yet of {what}", point, normal, float(min(0.004, s.reach.deepest_m)),
+        "press", f"it tells {what}", point, normal, float(min(0.004, s.reach.deepest_m)),
         s.reach.press_speed_m_per_s, s.reach.hold_s, s.reach.clearance_m, 3.0,
     )  # fmt: skip
 
@@ -228,14 +228,19 @@ def _why(s: Situation, best: TouchCandidate) -> str:
     if best.for_goal == "modulus":
         now = goals["modulus"]
         return (
-            f"the modulus is known within {100 * now.now:.0f} % and {100 * now.goal:.0f} % is the goal: "
+            f"the modulus is known within {_at_least(100 * now.now)} % and {100 * now.goal:g} % is the goal: "
             "this place shares least with those pressed"
         )
     now = goals["surface"]
     return (
-        f"95 % of the surface is known within {1e3 * now.now:.1f} mm and {1e3 * now.goal:.1f} mm is "
+        f"95 % of the surface is known within {_at_least(1e3 * now.now)} mm and {1e3 * now.goal:g} mm is "
         "asked for: here it is least known"
     )
+
+
+def _at_least(value: float) -> str:
+    """To a tenth, rounded up: what misses a goal never reads as if it met it."""
+    return f"{np.ceil(10 * value) / 10:.1f}"
 
 
 @dataclass(frozen=True)

@@ -181,6 +181,11 @@ def _checked(table: dict[str, Any], file: Path) -> None:
     check_table(known, {**SCHEMA, "effects": effect_keys()}, file, ModelError, strict=True)
 
 
+def models_in(folder: Path) -> list[Path]:
+    """MODEL folders that lie in a folder, by name."""
+    return sorted(each.parent for each in folder.glob("*/model.toml"))
+
+
 def read_model(path: Path | str) -> Model:
     """Read a MODEL folder.
 
@@ -190,10 +195,9 @@ def read_model(path: Path | str) -> Model:
     path = Path(path)
     for name in ("model.toml", "mesh.vtu", "presses.bin"):
         if not (path / name).is_file():
-            raise ModelError(
-                f"'{path}' is no MODEL folder: it has no {name}; "
-                "make one with 'palpate reconstruct REC -o MODEL'"
-            )
+            inside = models_in(path)
+            cure = f"'{inside[0]}' is one" if inside else "make one with 'palpate reconstruct REC -o MODEL'"
+            raise ModelError(f"'{path}' is no MODEL folder: it has no {name}; {cure}")
     table = read_toml(path / "model.toml", ModelError)
     version = table.get("format", "none")
     if version != FORMAT:

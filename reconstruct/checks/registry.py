@@ -40,7 +40,7 @@ from palpate.reconstruction.steps.s1_filter.noise import FilterOptions
 from palpate.reconstruction.steps.s1_filter.signals import filtered_of
 from palpate.reconstruction.steps.s2_base import BoundaryOptions
 from palpate.reconstruction.steps.s3_contacts.contacts import explore
-from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans
+from palpate.reconstruction.steps.s3_contacts.first_touch import ContactSpans, how_to_go_on
 from palpate.reconstruction.steps.s3_contacts.left_out import within_slab, without_slides
 from palpate.reconstruction.steps.s3_contacts.quasi_static import is_points
 from palpate.reconstruction.steps.s3_contacts.sliding_presses import FLAT
@@ -160,7 +160,7 @@ def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[tuple[
     except NoBaseError as error:
         return ordered([*found, _refused(recording, "no base", error, OF_A_KNOWN_OBJECT)]), None
     except ContactError as error:
-        return ordered([*found, _refused(recording, "no presses", error, _with_few(error))]), None
+        return ordered([*found, _refused(recording, "no presses", error, _with_few(recording, error))]), None
     return ordered([*found, *checked_presses(exploration)]), len(exploration.presses)
 
 
@@ -239,19 +239,23 @@ def _too_short(recording: Recording) -> Finding:
     )
 
 
-def _with_few(error: ContactError) -> tuple[Way, ...]:
-    """Ways for the presses that there are: on something flat few tell a modulus, less surely."""
+def _with_few(recording: Recording, error: ContactError) -> tuple[Way, ...]:
+    """Ways for the presses that there are: on something flat few tell a modulus, less surely. None of an
+    exploration, whose object was traced and which goes on."""
+    if how_to_go_on(recording):
+        return ()
     few = error.usable if isinstance(error, FewPressesError) else 0
     flat = (way for way in OF_A_KNOWN_OBJECT if few and "shape" not in way.options)
     return tuple(Way(way.says, {**way.options, "least_palpations": few}) for way in flat)
 
 
 def _refused(recording: Recording, name: str, error: ContactError, ways: tuple[Way, ...]) -> Finding:
+    more = "press at more places, each from the air and back"
     return Finding(
         name,
         str(error),
         "reconstruction stops there",
-        "say what is known of the object" if ways else "press at more places, each from the air and back",
+        "say what is known of the object" if ways else how_to_go_on(recording) or more,
         np.inf,
         np.inf,
         (float(recording.t[0]), float(recording.t[-1])),

@@ -9,6 +9,7 @@ import numpy as np
 from palpate.mechanics.statistics import spread_about_zero, weighted_median
 from palpate.reconstruction.checks.finding import ALL_THE_SAME, OF_A_KNOWN_OBJECT, Finding
 from palpate.reconstruction.measured import Measured
+from palpate.reconstruction.steps.s2_base import LEAN
 from palpate.reconstruction.steps.s3_contacts.on_support import supported
 
 _BELOW = 6.0
@@ -29,9 +30,29 @@ def support(measured: Measured) -> Iterator[Finding]:
     boundary = measured.boundary
     if not boundary.interval[1] > boundary.interval[0]:
         return
+    yield from _beside(measured)
     yield from _below(measured)
     yield from _hollow(measured)
     yield from _size(measured)
+
+
+def _beside(measured: Measured) -> Iterator[Finding]:
+    """A stated tracing that nothing pushed sideways: one that is not stated is none (`ContactSpans.base`)."""
+    why = measured.spans.beside_foot(measured.boundary) if measured.spans is not None else ""
+    if not why:
+        return
+    t, (a, b) = measured.recording.t, measured.boundary.interval
+    yield Finding(
+        "beside the foot",
+        why,
+        "5 standard errors",
+        LEAN,
+        np.inf,
+        np.inf,
+        (float(t[a]), float(t[b - 1])),
+        ("fx", "fy", "fz"),
+        _WITHOUT_BASE,
+    )
 
 
 def _below(measured: Measured) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter1d, label
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, cKDTree
 
 from palpate.mechanics.errors import ContactError, NoBaseError, OptionError
 from palpate.mechanics.options import option
@@ -29,6 +29,8 @@ UNTRACED = (
     "`palpate open REC --shape FILE`, `palpate open REC --slab M` or `palpate open REC --half-space`"
 )
 """What goes on without a tracing, whatever command came upon it."""
+LEAN = "trace again and lean the tip against the object's foot all the way round"
+"""What mends a tracing beside the foot."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,46 @@ def refuse_no_foot(boundary: Boundary, touched: np.ndarray, t: np.ndarray, tip_r
         f"within {1e3 * reach:.3g} mm of its middle{beside}; {UNTRACED}; or trace the object's foot and "
         "record again; a tracing that is there is stated by [recording] boundary_phase"
     )
+
+
+@dataclass(frozen=True)
+class Lean:
+    """Sideways force of a tracing, out of the object: N, the median along the way, and its standard error."""
+
+    force_n: float
+    error_n: float
+
+    def below(self, force_n: float) -> bool:
+        """Whether it is surely less than a force, N."""
+        return self.force_n + _SURELY * self.error_n < force_n
+
+
+def lean(boundary: Boundary, position: np.ndarray, force_on_tool: np.ndarray, rate_hz: float) -> Lean:
+    """How hard the tip leaned against the object's foot; all samples (n, 3) m and N, low-passed.
+
+    Friction on the support is along the way and a bias turns with it, so neither counts. Of a tracing too
+    short to tell, the error is infinite.
+    """
+    rows = slice(*boundary.interval)
+    off, nearest = cKDTree(boundary.centres).query(position[rows])
+    out = boundary.centres - boundary.outline
+    out = out - (out @ boundary.support_normal)[:, None] * boundary.support_normal
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    force = force_on_tool[rows]
+    on_way = (off < _ON_WAY_M) & (force @ boundary.support_normal > 0)
+    sideways = np.einsum("ij,ij->i", force, out[nearest])[on_way]
+    block = round(_BLOCK_S * rate_hz)
+    means = sideways[: len(sideways) // block * block].reshape(-1, block).mean(axis=1)
+    if len(means) < _LEAST_BLOCKS:
+        return Lean(float("nan"), float("inf"))
+    middle = float(np.median(means))
+    scatter = 1.4826 * float(np.median(np.abs(means - middle)))
+    return Lean(middle, 1.2533 * scatter / len(means) ** 0.5)
+
+
+_SURELY = 5.0  # standard errors
+_BLOCK_S, _LEAST_BLOCKS = 0.5, 8
+_ON_WAY_M = 0.001
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,13 @@ from any other.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
+from warnings import warn
 
 import numpy as np
 
@@ -23,17 +26,20 @@ from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Sugge
 from palpate.diagnosis.explore.goals import GoalOptions, check_goals
 from palpate.diagnosis.explore.segments import Instrument
 from palpate.diagnosis.explore.suggestion import Explored
-from palpate.mechanics.errors import DeviceError, OptionError
+from palpate.mechanics.disk.writing import written_at
+from palpate.mechanics.errors import DeviceError, OptionError, PalpateWarning
 from palpate.mechanics.options import check_ranges, flag_of
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
+from palpate.mechanics.recording.files import SAMPLES, recording_files
 from palpate.mechanics.recording.recording import read_recording
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, operation, option
-from palpate.operations._shared import SAMPLES, PhantomFileOptions, Seed, output_option, report_option
+from palpate.operations._shared import PhantomFileOptions, Seed, output_option, report_option
 from palpate.operations.simulate import effects_from
 from palpate.robot import LaboratoryRobot, RobotOptions, serve
 from palpate.scenes.laboratory.session import SimulateOptions
 from palpate.scenes.phantoms import phantom as named
+from palpate.show import next_lines
 from palpate.words import kpa, mm
 
 if TYPE_CHECKING:
@@ -62,7 +68,9 @@ def explore(
     ] = None,
     going_on: Annotated[
         str | None,
-        option("go on with what was explored so far", flag="--continue", metavar="REC", reads=True),
+        option(
+            "go on with what was explored so far; REC may be --output too", flag="--continue", metavar="REC"
+        ),
     ] = None,
     report: Annotated[
         str | None, report_option("write the page of what was touched, what is known, and why")
@@ -113,6 +121,7 @@ def explore(
     if (phantom is not None) + robot + (device is not None) != 1:
         raise OptionError("give who touches: one of --phantom NAME, --robot and --device NAME")
     check_goals(goals)
+    _give_way(going_on, output)
     begun = partial(_explorer, going_on, goals, reach, seed)
     said = {
         "scene": scene, "screenshot": screenshot, "seconds": seconds, "effects": effects,
@@ -162,6 +171,35 @@ def _refuse_idle(who: str, said: Mapping[str, Any]) -> None:
         raise OptionError(f"{flag} goes with {others}, not with {who}")
 
 
+def _give_way(going_on: str | None, output: str) -> None:
+    """Say that a recording which is there is replaced. What is gone on with may be: it is read first, and
+    every file that is written holds all of it. Raises OptionError where no exploration wrote that."""
+    file, _ = written_at(output, SAMPLES)[0]
+    if not file.exists():
+        return
+    if going_on is None or not any(file.samefile(each) for each in recording_files(Path(going_on))):
+        warn(
+            f"{file} is there, and is replaced after the first touch; `--continue {file}` goes on with it",
+            PalpateWarning, stacklevel=2,
+        )  # fmt: skip
+    elif not read_recording(going_on).segments:
+        raise OptionError(
+            f"--output would replace {going_on}, which is no exploration's: name another output"
+        )
+
+
+@contextmanager
+def _kept(explorer: Explorer, output: str, call: Call) -> Iterator[None]:
+    """Where it is interrupted, what was kept and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        if explorer.segments:
+            result = explorer.explored(output)
+            call.out.say(f"interrupted; kept in {output}", *result.lines(), *next_lines(result))
+        raise
+
+
 Begun = Callable[[Instrument, float], Explorer]
 """(instrument, Poisson's ratio) -> an explorer that has just begun, or that goes on."""
 
@@ -209,7 +247,7 @@ def _in_window(begun: Begun, output: str, scene: str, given: Mapping[str, Any], 
     if touched is not None:
         call.out.say(*touched.lines())
     call.out.say(_line(kept[-1].suggest(), kept[-1].state))
-    return kept[-1].explored(output)
+    return kept[-1].explored(output if kept[-1].segments else "")
 
 
 def _by_robot(
@@ -234,7 +272,7 @@ def _on_phantom(begun: Begun, output: str, robot: LaboratoryRobot, most: int, ca
     explorer = begun(robot.instrument, robot.phantom.poisson_ratio)
     robot.made = sum(s.kind == "press" for s in explorer.segments)
     before: ExplorationState | None = None
-    with call.progress("explore") as show_progress:
+    with _kept(explorer, output, call), call.progress("explore") as show_progress:
         while True:
             made = explorer.state.made
             show_progress(f"touch {made + 1} of at most {most}", min(made / most, 1.0))

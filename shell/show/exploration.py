@@ -41,6 +41,8 @@ def story(result: Explored) -> say.Story:
         yield say.Sentence(f"The last touch could not be used: {state.trouble}", on=say.PAGE)
     more = f" --most {2 * state.made}" if result.last.kind == "stop" else ""
     go_on = f"go on: the same command with `--continue {recording}{more}`"
+    if not result.path:
+        go_on = "begin anew: nothing was taken in, and nothing written"
     model = f"make a model of it: `palpate reconstruct {recording} -o MODEL`"
     yield say.Next([*([model] if soft else []), *([] if state.done else [go_on])])
     yield say.Rows(

@@ -18,7 +18,8 @@ class BaseTracing:
     """Counts the directions, seen from the base's middle, in which the tip stood at the foot on the support.
 
     first, last: numbers of the first and the last tip that counted, None before there is one; later ones
-    than those that closed the way around do not count.
+    than those that closed the way around do not count. off_m: how far the tip last slid from the foot, where
+    that was too far to count.
     """
 
     def __init__(self, model: Model) -> None:
@@ -33,6 +34,7 @@ class BaseTracing:
         self._seen = np.zeros(SECTORS, dtype=bool)
         self.first: int | None = None
         self.last: int | None = None
+        self.off_m = 0.0
 
     def add(self, tips_m: np.ndarray, numbers: np.ndarray) -> None:
         """(n, 3) m, centres of the tip, and (n,) what each is counted by."""
@@ -42,7 +44,11 @@ class BaseTracing:
         height = model.support.height(tips_m)
         low = np.flatnonzero(height < model.tool.tip_radius_m)
         away = (tips_m[low] - self._middle) @ self._axes
-        near = self._foot.query(away)[0] < model.tool.tip_radius_m + NEAR_M if len(low) else low
+        if not len(low):
+            return
+        off = self._foot.query(away)[0] - model.tool.tip_radius_m
+        near = off < NEAR_M
+        self.off_m = 0.0 if near.any() else float(off.min())
         at_foot, away = low[near], away[near]
         if not len(at_foot):
             return

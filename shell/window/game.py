@@ -1,7 +1,9 @@
 """Find the nodule: hidden until the answer, scored by distance and time, one renderer against another.
 
-The clock runs from the first touch. A round's score is 100 for an answer on the spot in no time; it halves
-with every nodule's radius that the answer is off, seen from above, and with every minute.
+The clock runs from the first touch. A round's score is 100 for an answer over the nodule in no time, as the
+N/m tell no place over it from another: within 1 % they are the same 6.5 mm from its middle, from 2 to 10 mm
+deep. It halves with every nodule's radius that the answer is beside it, seen from above, and every
+HALF_TIME_S.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ from palpate.mechanics.model.material import Ball
 from palpate.scenes.scene import FIND_M
 from palpate.words import mm, renderer_words
 
-HALF_TIME_S = 60.0
+HALF_TIME_S = 150.0
+"""What somebody who had never played took."""
 PRESSED = 0.9
 """Share of a press's depth from which the tip is where it pressed, and no longer on its way in or out."""
 PRESS_M = FIND_M
@@ -24,10 +27,12 @@ PRESS_M = FIND_M
 
 @dataclass(frozen=True)
 class Guess:
-    """renderer: what was felt. off_m: beside the nodule's middle, seen along `up`. score: 0 to 100."""
+    """renderer: what was felt. off_m: from the nodule's middle, seen along `up`; beside_m: from its edge, 0
+    over it. score: 0 to 100."""
 
     renderer: str
     off_m: float
+    beside_m: float
     seconds: float
     score: float
 
@@ -74,8 +79,10 @@ class Game:
         seconds, self._started_s = now_s - self._started_s, None
         offs = [self._off(self._place_m, ball) for ball in self.hidden]
         nearest = int(np.argmin(offs))
-        halvings = offs[nearest] / self.hidden[nearest].radius_m + seconds / HALF_TIME_S
-        self.answers.append(Guess(renderer, offs[nearest], seconds, 100.0 * 0.5**halvings))
+        radius = self.hidden[nearest].radius_m
+        beside = max(0.0, offs[nearest] - radius)
+        score = 100.0 * 0.5 ** (beside / radius + seconds / HALF_TIME_S)
+        self.answers.append(Guess(renderer, offs[nearest], beside, seconds, score))
         return self.answers[-1]
 
     def _off(self, point_m: np.ndarray, ball: Ball) -> float:
@@ -86,13 +93,17 @@ class Game:
         """For the panel: what to do, the last round, and the mean score of each renderer."""
         if self._started_s is not None:
             ran = f"{self.seconds(now_s):.0f} s so far."
-            first = f"Compare the N/m above. Press last where they are most, then click 'It is here'. {ran}"
+            first = (
+                "Compare the N/m above. Press last in the middle of where they are most, then click "
+                f"'It is here'. {ran}"
+            )
         elif self.answers:
             last = self.answers[-1]
+            where = f"{mm(last.beside_m, '.1f')} beside the nodule" if last.beside_m else "Over the nodule"
             first = (
-                f"{mm(last.off_m, '.1f')} from the nodule after {last.seconds:.0f} s by "
-                f"{renderer_words(last.renderer)}: {last.score:.0f} of 100 points. Touch anew to go on; Tab: "
-                "next renderer."
+                f"{where} after {last.seconds:.0f} s by {renderer_words(last.renderer)}: {last.score:.0f} of "
+                f"100 points, halved by its radius beside it and by {HALF_TIME_S:.0f} s. Touch anew to go "
+                "on; Tab: next renderer."
             )
         else:
             deep = mm(PRESS_M, "g")

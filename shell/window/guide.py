@@ -107,6 +107,7 @@ class Guide:
         self.state: ExplorationState = explorer.state
         self.touched = np.zeros((0, 3))
         self._taken = self._thought = 0
+        self._share, self._missed = 0.0, False
 
     @property
     def ghost(self) -> Ghost | None:
@@ -145,6 +146,7 @@ class Guide:
         lasted = (self._last_touch - self._first) / rate
         self._first = self._last_touch = None
         if self._still_tracing and not self._tracing.done:
+            self._missed, self._share = self._tracing.share == self._share, self._tracing.share
             return
         if self._still_tracing or lasted >= LEAST_S:
             self._take_in()
@@ -217,6 +219,7 @@ class Guide:
         what = WHAT.get(s.kind, "")
         if self._still_tracing:
             what += f" ({100 * self._tracing.share:.0f} % traced): the red part is missing"
+            what += "; that touch was not at the foot, and does not count" * self._missed
         if self._thinking:
             what = "wait: the next touch is being thought of"
         elif s.kind == "press":

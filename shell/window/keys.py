@@ -105,7 +105,7 @@ ZOOM_A_STEP = 1.12
 class Orbit:
     """Moves a camera about `middle_m` (3,); up: the support's unit normal, over which the eye stays.
 
-    from_m: (3,) m where the eye begins. azimuth: where it stands about the vertical, rad.
+    from_m: (3,) m where the eye begins.
     """
 
     def __init__(self, camera: vtkCamera, middle_m: np.ndarray, up: np.ndarray, from_m: np.ndarray) -> None:
@@ -123,13 +123,18 @@ class Orbit:
 
     def reset(self) -> None:
         """Back to where it began."""
-        self.azimuth, self._height, self._distance_m = self._home
+        self._azimuth, self._height, self._distance_m = self._home
         self._middle = self._home_middle.copy()
         self._apply()
 
+    @property
+    def stands(self) -> tuple[float, float]:
+        """Where the eye stands about the vertical and over the horizon, rad."""
+        return self._azimuth, self._height
+
     def turn(self, across: float, upwards: float) -> None:
         """A drag by shares of the picture's height: the object follows the mouse."""
-        self.azimuth -= TURN_A_HEIGHT * across
+        self._azimuth -= TURN_A_HEIGHT * across
         self._height = float(np.clip(self._height - TURN_A_HEIGHT * upwards, LOWEST, HIGHEST))
         self._apply()
 
@@ -156,7 +161,7 @@ class Orbit:
         self._apply()
 
     def _apply(self) -> None:
-        flat = self._axes @ [math.cos(self.azimuth), math.sin(self.azimuth)]
+        flat = self._axes @ [math.cos(self._azimuth), math.sin(self._azimuth)]
         eye = math.cos(self._height) * flat + math.sin(self._height) * self._up
         camera = self._camera
         camera.SetFocalPoint(*self._middle)

@@ -36,6 +36,7 @@ NAMES = {
     "KP_Add": "plus",
     "KP_Subtract": "minus",
     "Home": "v",
+    "question": "h",
     "KP_Enter": "Return",
 }
 """Key symbols that do what another does."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from palpate.render.registry import names
 from palpate.show.colours import ACCENT, GREY, HINT, WARNING, colour_of
+from palpate.window.guide import ON_IT
 from palpate.window.keys import KEYS, help_rows, shown
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
 from palpate.window.session import FRICTIONS, MODULUS_STEP, TouchSession
@@ -33,7 +34,7 @@ class NextStep:
 
     def __init__(self, window: TouchWindow, *, mouse: bool) -> None:
         pointer, session, orbit = window.pointer, window.session, window.orbit
-        depth, look = pointer.press_depth_m, orbit.azimuth
+        depth, look = pointer.press_depth_m, orbit.stands
         self._began: np.ndarray | None = None
         self._can_stop = session.has_force
         free = window.game is None and not window.guided
@@ -47,7 +48,7 @@ class NextStep:
             ("Hold the left button: the tip presses in.", _pushed),
             ("Hold it, and turn the wheel: deeper, or less deep.", lambda _: pointer.press_depth_m != depth),
             ("Hold it, and drag: the tip sticks, then slides.", self._dragged),
-            ("Hold the right button and move: the view turns.", lambda _: orbit.azimuth != look),
+            ("Hold the right button and move: the view turns.", lambda _: orbit.stands != look),
         ]
         if not free:
             del steps[2:4]
@@ -91,7 +92,7 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
     called, colour = (others[0].name, colour_of(others[0].name)) if others else ("", GREY)
     rows.append((Item(second, size=15, bold=True, colour=colour, tip=called),))
     rows += [
-        (Item(_where(frame), size=12, colour=GREY, tip=HERE),),
+        (Item(_where(window, frame), size=12, colour=GREY, tip=HERE),),
         (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=6 if window.game else 2),),
     ]
     if window.moved_by_mouse:
@@ -99,10 +100,14 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
     return [*rows, *_buttons(window), *_status(window, frame)]
 
 
-def _where(frame: Frame) -> str:
+def _where(window: TouchWindow, frame: Frame) -> str:
     if frame.touching:
         return f"{mm(frame.depth_m, '.1f')} deep, {frame.stiffness_n_per_m:.0f} N/m here"
-    return "on the support" if _pushed(frame) else "in air"
+    if not _pushed(frame):
+        return "in air"
+    # a force of the last moment is still drawn where the tip has just left the object
+    low = window.session.model.support.height(frame.tip_m) < ON_IT * window.session.servo.tip_radius_m
+    return "on the support" if low else "touching"
 
 
 def _pushed(frame: Frame) -> bool:
@@ -165,11 +170,11 @@ def _status(window: TouchWindow, frame: Frame) -> list[Row]:
     elif worker.failure:
         rows.append((Item(worker.failure, size=12, colour=WARNING),))
     if session.recording is not None:
-        traced = f"base traced {100 * session.recording.traced:.0f} %"
-        rows.append((Item(f"Recording {frame.recorded_s or 0.0:.0f} s, {traced}", size=12, colour=WARNING),))
+        said = f"Recording {frame.recorded_s or 0.0:.0f} s, {session.recording.words}"
+        rows.append((Item(said, size=12, colour=WARNING),))
     table = begun(frame.table) if session.feels_inside else ""
-    said = (window.known_words, table, frame.reason, window.notice)
-    return [*rows, *((Item(word, size=12, colour=GREY),) for word in said if word)]
+    more = (window.known_words, table, frame.reason, window.notice)
+    return [*rows, *((Item(word, size=12, colour=GREY),) for word in more if word)]
 
 
 def _about_tip(name: str, session: TouchSession) -> str:

@@ -22,6 +22,8 @@ from palpate.window.worker import Frame, RendererView
 from palpate.words import mm
 
 ARROW_M_PER_N = 0.03
+LONGEST_ARROW = 0.25
+"""Of the object's diagonal: a longer one leaves the picture, and crosses what is written there."""
 LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
@@ -66,6 +68,7 @@ class ObjectPicture:
         self._surface = pyvista.PolyData.from_regular_faces(felt.vertices[self._lit.at], self._lit.triangles)
         self._surface["displacement (mm)"] = np.zeros(len(self._lit.at))
         self._rest, self._moved = felt.vertices, np.zeros_like(felt.vertices)
+        self._longest_m = LONGEST_ARROW * float(np.linalg.norm(np.ptp(felt.vertices, axis=0)))
         self._place_surface()
         self._actor: pyvista.Actor | None = None
         self._bar, self._scale = "", 1.0
@@ -197,7 +200,7 @@ class ObjectPicture:
         self._arrow.SetVisibility(size > LEAST_ARROW_N)
         if size > LEAST_ARROW_N:
             start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
-            self._arrow.SetUserMatrix(arrow_matrix(start, force, ARROW_M_PER_N * size))
+            self._arrow.SetUserMatrix(arrow_matrix(start, force, min(ARROW_M_PER_N * size, self._longest_m)))
 
 
 def _ramp(stops: list[str]) -> Any:

@@ -2,8 +2,8 @@
 
 The tip hovers over the place that the mouse points at, a little off the surface; while the button is held it
 goes in along the inward normal, and out again when it is let go. Over the support it comes down onto the
-support, and beside the object it slides along the foot, so that the base can be traced. To a place far from
-the last one it travels in free air, over the object where that stands in the way.
+support, and beside the object it leans against the foot and slides along it, so that the base can be traced.
+To a place far from the last one it travels in free air, over the object where that stands in the way.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from vtkmodules.vtkCommonCore import mutable
 from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
 
 from palpate.mechanics.shape.tetmesh import vertex_normals
+from palpate.window.base_tracing import NEAR_M
 
 HOVER_M = 0.008
 PRESS_SPEED_M_PER_S = 0.02
@@ -26,6 +27,7 @@ LEAN_M = 0.0003
 CLEAR_M = 0.001
 LEAST_PRESS_M, MOST_PRESS_M = 0.0005, 0.010
 MOST_SPEED_M_PER_S = 0.4
+_CLOSE_M = 1e-6
 LEAP_M, ARRIVED_M = 0.02, 0.002
 """Farther than a leap from where it should be, the tip travels until it has arrived."""
 
@@ -148,7 +150,9 @@ class Pointer:
         centre = target.point + (self.radius - depth_m) * target.normal
         if not target.on_support:
             return centre
-        return self._beside(centre, self.radius + (CLEAR_M if depth_m < 0 else -LEAN_M))
+        if depth_m < 0:
+            return self._beside(centre, self.radius + CLEAR_M)
+        return self._beside(centre, self.radius - LEAN_M, self.radius + NEAR_M)
 
     def _go(self, to: np.ndarray, reach_m: float) -> np.ndarray:
         move = to - self.tip_m
@@ -176,13 +180,14 @@ class Pointer:
                 return False
         return True
 
-    def _beside(self, centre: np.ndarray, gap_wanted: float) -> np.ndarray:
-        """Moved along the support until the tip's centre is this far from the foot."""
+    def _beside(self, centre: np.ndarray, gap_wanted: float, drawn_m: float = 0.0) -> np.ndarray:
+        """Moved along the support until the tip's centre is this far from the foot; to it where it is nearer
+        than drawn_m, so that what counts as traced leans."""
         for _ in range(8):
             closest, inside = self._closest(centre)
             away = centre - closest
             gap = -float(np.linalg.norm(away)) if inside else float(np.linalg.norm(away))
-            if gap >= gap_wanted:
+            if gap >= max(gap_wanted, drawn_m) or abs(gap - gap_wanted) < _CLOSE_M:
                 break
             sideways = (-away if inside else away) - ((-away if inside else away) @ self._up) * self._up
             length = float(np.linalg.norm(sideways))

@@ -14,6 +14,7 @@ from palpate.mechanics.recording.recording import write_recording
 from palpate.servo import Servo
 from palpate.servo.recorder import Recorder
 from palpate.window.base_tracing import BaseTracing
+from palpate.words import mm
 
 MARGIN_S = 0.05
 
@@ -43,6 +44,13 @@ class SessionRecording:
     def traced(self) -> float:
         """The share of the way around the base that was traced on the support."""
         return self._tracing.share
+
+    @property
+    def words(self) -> str:
+        """How much of the way around the base was traced on the support, and why not more."""
+        off = self._tracing.off_m
+        why = f": {mm(off, '.0f')} beside the foot, lean against it" if off else ""
+        return f"base traced {100 * self.traced:.0f} %{why}"
 
     def collect(self) -> None:
         """Take over what the servo's ring holds."""

@@ -85,6 +85,7 @@ def explore_cylinder(
     without_phase: bool = False,
     tool_mass_kg: float = 0.0,
     lift: bool = False,
+    lean_n: float = 0.03,
     unlike_speeds: bool = False,
     adhesion_n: float = 0.0,
     seed: int = 0,
@@ -114,7 +115,8 @@ def explore_cylinder(
         if lift:
             touch[3000:3200] = 0.0
             ring[3000:3200, 2] += 0.002 * np.sin(np.linspace(0, np.pi, 200))
-        add(ring, 2.5 * touch * (np.array([0, 0, 1.0]) - 0.2 * along))
+        out = (ring - [0, 0, TIP]) / (RADIUS + TIP)
+        add(ring, touch * (2.5 * (np.array([0, 0, 1.0]) - 0.2 * along) + lean_n * out))
         phase = (first / RATE, count() / RATE)
         here = ring[-1] + [0, 0, 0.03]
         add(ring[-1] + smooth(300)[:, None] * (here - ring[-1]))

@@ -178,6 +178,16 @@ def test_deep_presses_alone_are_no_tracing():
     assert {"shape", "slab_m", "half_space"} <= {name for way in found[0].ways for name in way.options}
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_tracing_that_nothing_pushes_sideways_is_no_foot(stated):
+    """A circle on the open table shows no object, however well it closes; one that leans a little does."""
+    for lean_n, beside in ((0.0, True), (0.02, False)):
+        recording, _ = explore_cylinder(lean_n=lean_n, noise=1e-3, state_phase=stated)
+        grave = [f for f in check(recording) if f.grave]
+        assert [f.name for f in grave] == ["beside the foot" if stated else "no base"] * beside
+        assert all("lean" in f"{f.todo} {f.saw}" for f in grave)
+
+
 @pytest.mark.parametrize("aside", [0.0, 0.2])
 def test_a_foot_has_the_presses_over_it_and_room_for_an_object(aside):
     angle = np.linspace(0, 2 * np.pi, 3000)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.compliance.stored_compliance import compliance_file, compliance_key, load_or_condense
-from palpate.mechanics.errors import FileError, PalpateWarning, SceneError
+from palpate.mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress
@@ -129,3 +129,16 @@ def test_a_folder_that_is_not_there_is_called_missing(tmp_path):
     with pytest.raises(SceneError) as told:
         load_scene(tmp_path / "M1")
     assert "no file or folder" not in str(told.value)
+
+
+def test_what_lies_beside_or_in_a_model_names_it(tmp_path):
+    """A report, a part of a MODEL, and the folder around it: each was refused without a word of the MODEL."""
+    (tmp_path / "demo" / "model").mkdir(parents=True)
+    part, report = tmp_path / "demo" / "model" / "model.toml", tmp_path / "demo" / "report.html"
+    part.write_text("format = 1")
+    report.write_text("<html></html>")
+    for path in (part, report):
+        with pytest.raises(SceneError, match=r"demo/model\b(?!/)"):
+            load_scene(path)
+    with pytest.raises(ModelError, match="demo/model' is one"):
+        read_model(load_scene(tmp_path / "demo").source)

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from palpate import cli
+from palpate.diagnosis.explore.candidates import ReachOptions
 from palpate.diagnosis.explore.goals import GoalState
 from palpate.diagnosis.explore.state import ExplorationState
-from palpate.diagnosis.explore.suggestion import Suggestion
+from palpate.diagnosis.explore.suggestion import Suggestion, _first, _why
 from palpate.operations.explore import _line
 from palpate.operations.press import _compared
 from palpate.operations.touch import _Opening
@@ -48,6 +49,33 @@ def test_a_line_says_that_less_is_known_than_before():
     assert "less sure" not in _line(stop, state(0.002), state(0.007))
     assert "less sure" not in _line(stop, state(0.002))
     assert "5 %" in state(0.001).words and "2 mm" in state(0.001).words  # what was asked for
+
+
+def test_a_goal_that_is_missed_reads_as_missed():
+    """'known within 5 % and 5 % is the goal' asked for one more press."""
+    best = SimpleNamespace(for_goal="modulus")
+    missed = GoalState("modulus", 0.0501, 0.05), GoalState("surface", 0.00201, 0.002)
+    situation = SimpleNamespace(state=SimpleNamespace(goals=missed))
+    assert "within 5.1 % and 5 % is the goal" in _why(situation, best)
+    best.for_goal = "surface"
+    assert "within 2.1 mm and 2 mm is" in _why(situation, best)
+
+
+def test_a_first_press_is_reasoned_once():
+    """'nothing is known yet; press at ...: nothing is known yet of how high the object is'."""
+    base = SimpleNamespace(
+        outline=0.04 * np.eye(3)[[0, 1, 0, 1]] * [[1], [1], [-1], [-1]], support_normal=np.array([0, 0, 1.0])
+    )
+    base.support_point = base.outline.mean(axis=0)
+    situation = SimpleNamespace(
+        state=SimpleNamespace(made=0), reach=ReachOptions(), heights=np.zeros(0), tip_radius_m=0.005
+    )
+    suggestion = _first(situation, base)
+    assert _line(suggestion, unknown()).count("known") == 1 and "how high" in suggestion.why
+
+
+def unknown() -> ExplorationState:
+    return ExplorationState(0, 0, 0.0, np.nan, (np.nan, np.nan), np.nan, "", ())
 
 
 def test_without_a_screen_an_exploration_is_told_what_explores_without_one(tmp_path, monkeypatch, capsys):

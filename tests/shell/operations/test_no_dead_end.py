@@ -17,6 +17,7 @@ import palpate.show
 from palpate.cli import main
 from palpate.mechanics.errors import ContactError, OptionError, RecordingError
 from palpate.mechanics.recording.recording import write_recording
+from palpate.mechanics.recording.segments import TimeSegment
 from palpate.operations._list import OPERATIONS
 from palpate.operations._run import parser_of
 from palpate.operations._written import import_words, open_words
@@ -200,6 +201,28 @@ def test_few_presses_are_told_what_they_suffice_for():
     assert finding.name == "no presses" and [w.options["least_palpations"] for w in finding.ways] == [2, 2]
     with pytest.raises(ContactError, match="--least-palpations 2"):
         pp.reconstruct(two_presses(), half_space=True, progress=False)
+
+
+def test_an_exploration_that_was_broken_off_is_told_to_go_on(tmp_path, capsys):
+    """Of a traced dome with two presses it said 'it is a slab', and nothing of --continue."""
+    few = two_presses()
+    start, end = few.boundary_phase
+    stretches = (TimeSegment("trace", 0.0, end), TimeSegment("press", end + 0.001, float(few.t[-1])))
+    file = str(write_recording(tmp_path / "mine.csv", replace(few, segments=stretches)))
+    for words in (["check", file], ["reconstruct", file, "-o", str(tmp_path / "M")], ["diagnose", file]):
+        assert main(words) in (1, 2)
+        said = capsys.readouterr()
+        assert f"--continue {file}" in said.out + said.err and "slab" not in said.out + said.err
+
+
+def test_no_press_is_asked_to_exceed_what_no_sensor_tells():
+    """'until the force is above 4.9e-05 N' was asked of a recording without noise."""
+    noisy = two_presses()
+    quiet = replace(noisy, force_on_tool=explore_cylinder(noise=1e-6)[0].force_on_tool[: len(noisy.t)])
+    for recording, asked in ((noisy, True), (quiet, False)):
+        with pytest.raises(ContactError, match="at more places") as refused:
+            pp.reconstruct(replace(recording, force_noise_std_n=None), progress=False)
+        assert (" mN" in str(refused.value)) == asked and "e-0" not in str(refused.value)
 
 
 @pytest.mark.slow

@@ -92,6 +92,18 @@ def test_lifting_off_while_tracing_ends_nothing_and_a_brush_is_no_press(guided):
     assert press.t[0] == pytest.approx(trace.t[-1] + 1 / RATE)
 
 
+def test_a_touch_that_is_not_at_the_foot_is_said_not_to_count(guided):
+    """A press before the foot was traced was dropped without a word."""
+    guide, servo, explorer, tracing = guided
+    _frames(guide, servo, (0.3, 0.0), (0.5, 0.7), (0.6, 0.0))
+    assert "does not count" not in guide.lines()[0]
+    _frames(guide, servo, (0.5, 0.7), (0.6, 0.0))
+    assert "does not count" in guide.lines()[0]
+    tracing.share = 0.6
+    _frames(guide, servo, (0.5, 0.7), (0.6, 0.0))
+    assert "does not count" not in guide.lines()[0]
+
+
 def test_what_follows_a_tracing_that_was_not_understood_goes_on_with_it(guided):
     guide, servo, explorer, tracing = guided
     explorer.tracings = 2

@@ -139,7 +139,9 @@ def test_tracing_counts_the_way_around(block: Model) -> None:
     tracing.add(half, ticks)
     assert tracing.share == pytest.approx(0.5, abs=0.03) and not tracing.done
     tracing.add(half * [-1, -1, 2], 200 + ticks)  # above the support: does not count
-    tracing.add(half * [-1.2, -1.2, 1], 400 + ticks)  # away from the foot: does not count either
+    assert tracing.off_m == 0
+    tracing.add(half * [-1.4, -1.4, 1], 400 + ticks)  # away from the foot: does not count either
+    assert tracing.off_m == pytest.approx(0.4 * 0.045, abs=1e-3), "and how far is said"
     assert tracing.share == pytest.approx(0.5, abs=0.03) and tracing.last == 199
     tracing.add(half * [-1, -1, 1], 600 + ticks)
     assert tracing.done and (tracing.first, tracing.last) == (0, 799)

@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -24,7 +25,7 @@ from palpate.show.colours import COLOURS
 from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
 from palpate.window.keys import KEYS
-from palpate.window.panel import DEPTH, NextStep
+from palpate.window.panel import DEPTH, NextStep, main_rows
 from palpate.window.session import SessionOptions
 from palpate.window.widgets import BODY, fitted
 from palpate.window.widgets import SIZE as FULL
@@ -398,6 +399,46 @@ def test_a_button_that_is_held_on_the_support_is_asked_for_no_more(driven: Drive
     leaning = driven.until(lambda frame: not frame.touching and any(sizes(frame)))
     assert "left button" not in said.line(leaning)
     release(driven)
+
+
+def test_a_view_that_was_tilted_was_turned(driven: Driven) -> None:
+    """It was turned straight up, and to turn it was asked for still."""
+    orbit, frame = driven.window.orbit, driven.frame()
+    said = NextStep(driven.window, mouse=True)
+    said._steps = [(words, done) for words, done in said._steps if "view turns" in words]
+    assert "view turns" in said.line(frame)
+    orbit.turn(0.0, -0.1)
+    assert "view turns" not in said.line(frame)
+    orbit.reset()
+
+
+def test_the_arrow_of_a_great_force_stays_in_the_picture(driven: Driven) -> None:
+    """From 1.5 N on it was cut off, and crossed the titles."""
+    picture, frame = driven.window.pictures[0], driven.frame()
+    size_m = np.linalg.norm(np.ptp(driven.session.model.mesh.points, axis=0))
+    lengths = []
+    for newtons in (0.2, 0.4, 5.0, 50.0):
+        picture.update(frame, replace(frame.views[0], force_n=np.array([0.0, 0.0, newtons])))
+        matrix = picture._arrow.GetUserMatrix()
+        lengths.append(np.linalg.norm([matrix.GetElement(k, 0) for k in range(3)]))
+    assert lengths[1] == pytest.approx(2 * lengths[0]) and max(lengths) < 0.3 * size_m
+    driven.frame()
+
+
+def test_a_question_mark_opens_help(driven: Driven) -> None:
+    driven.key("question")
+    assert driven.window.aside == "h"
+    driven.key("question")
+    assert driven.window.aside == ""
+
+
+def test_a_force_high_over_the_support_is_not_the_supports(driven: Driven) -> None:
+    """Of a tip that had just left the dome it said 'on the support'."""
+    frame = driven.frame()
+    pushed = (replace(frame.views[0], force_n=np.array([0.0, 0.0, 0.3])),)
+    for height_m, low in ((0.005, True), (0.05, False)):
+        there = replace(frame, views=pushed, depth_m=0.0, tip_m=np.array([0.0, -0.06, height_m]))
+        assert ("on the support" in str(main_rows(driven.window, there))) == low
 
 
 def test_everything_stands_beside_everything_else(driven: Driven) -> None:
