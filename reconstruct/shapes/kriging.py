@@ -90,7 +90,9 @@ class Explained:
         centres = np.vstack([self.seen.centres, self.seen.outline])
         spread = np.array([p.spread for p in self.shape.parameters])
         lean = np.concatenate([np.zeros(len(self.seen.centres)), np.ones(len(self.seen.outline))])
-        return np.column_stack([parameter_slopes(self.shape, centres) * spread, lean * LEAN_SPREAD_M])
+        # an outline that folds has slopes without end: no gap changes by more than a metre
+        slopes = np.clip(parameter_slopes(self.shape, centres) * spread, -1.0, 1.0)
+        return np.column_stack([slopes, lean * LEAN_SPREAD_M])
 
     @cached_property
     def _matrix(self) -> np.ndarray:
