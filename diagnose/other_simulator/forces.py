@@ -147,8 +147,8 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions, level: floa
         _same_clock(t, force, presses)
     elif options.clock_offset_s:
         notes.append(
-            f"--clock-offset {options.clock_offset_s:.12g} is taken as the clock: a lag of the simulator's own "
-            "cannot be told from it, where that offset was fitted to the forces"
+            f"--clock-offset {options.clock_offset_s:.12g} is taken as the clock: a lag of the simulator "
+            "itself cannot be told from it, where that offset was fitted to the forces"
         )
     notes += _same_time(t, presses)
     at = np.column_stack([np.interp(presses.t, t, f, left=0.0, right=0.0) for f in force.T])

@@ -470,7 +470,7 @@ def test_an_early_force_by_a_stated_clock_is_early_and_nothing_else(world):
     asked = Asked(Forces(recording.t, 1.25 * exact, "a simulator"), stated, late)
     result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
     assert set(result.effects) == {"mesh_stiffness", "time_step"}
-    assert any("a lag of the simulator's own cannot be told from it" in note for note in result.notes)
+    assert any("a lag of the simulator itself cannot be told from it" in note for note in result.notes)
     step = next(e for e in result.entries if e.name == "time_step")
     assert step.parameters["delay_s"] == pytest.approx(-0.01, abs=0.002)
     assert keys_in_words(step).startswith("early by")
