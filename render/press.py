@@ -254,6 +254,9 @@ def first_touch(
     if on_object is None and beside is None:
         low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
         meant = _in_millimetres(at, low, high)
+        if not meant and _on_object(surface, at, -direction, radius) is not None:
+            turned = ",".join(f"{v:g}" for v in np.round(-direction, 4) + 0.0)
+            meant = f": the other way it does, --direction={turned}"
         raise OptionError(
             f"a tip of radius {radius} m aimed at {at.tolist()} along {np.round(direction, 4).tolist()} does "
             f"not meet the touchable surface (object within {np.round(low, 4).tolist()} to "

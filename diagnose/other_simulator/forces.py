@@ -43,6 +43,11 @@ LONGEST_GAP_S = 0.03
 """Without rows in a press, over which nothing is interpolated: the press is left out."""
 AGAINST, LAG_S, BETTER = -0.3, 0.15, 0.1
 """Cosine from which forces point the wrong way; lag that no delay makes; by how much it must fit better."""
+LEAST_LIKE = 0.5
+"""Likeness, a correlation, from which another clock is suggested: less is no likeness."""
+FORWARD = 0.9
+"""Of the steps from row to row, that go on in time at least: rows of a table out of order are sorted, a force
+that was taken for the time is refused."""
 _GRID_S = 0.02
 COARSE = 0.5
 """Of the smallest change that is named as a flaw: reading errors are alike at every press, and above it a
@@ -102,11 +107,19 @@ class Aligned:
 
 
 def sorted_forces(t: np.ndarray, force: np.ndarray, name: str) -> Forces:
-    """Rows without a number left out, sorted by time; raises RecordingError where fewer than two are left."""
+    """Rows without a number left out, sorted by time; raises RecordingError where fewer than two are left, or
+    where t goes back and forth."""
     notes = []
     good = np.isfinite(t) & np.isfinite(force).all(axis=1)
     if not good.all():
         notes.append(f"{(~good).sum()} rows without a number were left out")
+    back = np.diff(t[good]) < 0
+    if len(back) and back.mean() > 1 - FORWARD:
+        row = int(np.flatnonzero(good)[np.argmax(back) + 1]) + 1
+        raise RecordingError(
+            f"'{name}': t does not increase (row {row}; it goes back in {back.sum()} of {len(back)} steps): "
+            "is that column the time, in s?"
+        )
     t, force = t[good], force[good]
     order = np.argsort(t, kind="stable")
     if (np.diff(order) < 0).any():
@@ -132,6 +145,11 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions, level: floa
     _in_seconds(t, presses)
     if options.clock_offset_s is None:
         _same_clock(t, force, presses)
+    elif options.clock_offset_s:
+        notes.append(
+            f"--clock-offset {options.clock_offset_s:.12g} is taken as the clock: a lag of the simulator "
+            "itself cannot be told from it, where that offset was fitted to the forces"
+        )
     notes += _same_time(t, presses)
     at = np.column_stack([np.interp(presses.t, t, f, left=0.0, right=0.0) for f in force.T])
     rows = presses.counted if given.chosen is None else presses.counted & given.chosen[presses.press]
@@ -253,11 +271,12 @@ def _same_clock(t: np.ndarray, force: np.ndarray, presses: Presses) -> None:
     as_read = np.interp(presses.t, there, size, left=0.0, right=0.0)
     in_presses = np.corrcoef(measured, as_read)[0, 1] if as_read.std() > 0 else 0.0
     as_it_is = max(float(likeness[starts == first].sum()), float(in_presses))
-    if abs(lag) > LAG_S and likeness[best] > as_it_is + BETTER:
+    if abs(lag) > LAG_S and likeness[best] > max(as_it_is + BETTER, LEAST_LIKE):
         raise OptionError(
             f"the simulated forces fit the recording {lag:+.3g} s later far better (likeness "
             f"{likeness[best]:.2f} against {as_it_is:.2f}): is it another clock? State "
-            f"--clock-offset {lag:.12g}, or 0 to keep it as it is"
+            "the offset that you know of it (a lag of the simulator's own stays apart), else "
+            f"--clock-offset {lag:.12g} (with its lag in it), or 0 to keep it as it is"
         )
 
 

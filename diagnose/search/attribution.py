@@ -146,7 +146,10 @@ def attribute(
             break
     steps, current, chosen = selection.steps, selection.current, selection.chosen
     picked = tuple(chosen)[: len(steps)]
+    together = current
     current, chosen = _without_idle(search, chosen, current, seen)
+    if not search.forward.measured:
+        current, chosen = _without_wider(search, chosen, current, together)
     if any(n not in seen for n in chosen):
         current, chosen = drop_redundant(search, chosen, current, steps[0], seen)
     for effect in current.found.effects:
@@ -210,10 +213,15 @@ class _Selection:
             scores[effect.name] = self.search.score([effect], candidate, self.current)
         return scores
 
+    @property
+    def _least_n(self) -> float:
+        """N rms by which whatever is named beside the first changes the force at least."""
+        sizes = (self.steps[0][n].size_n for n in self.chosen[:1])
+        return self.search.options.least_of_first * max(sizes, default=0.0)
+
     def _able(self, scores: dict[str, Score]) -> list[Score]:
         """What may be there: it foretells places, and changes enough beside the first."""
-        search, first = self.search, self.chosen[:1]
-        least = search.options.least_of_first * max((self.steps[0][n].size_n for n in first), default=0.0)
+        search, first, least = self.search, self.chosen[:1], self._least_n
         able = [s for s in scores.values() if search.able(s, first=not first)]
         able = [s for s in able if _size_n(search, s, self.chosen, least) > least]
         if search.forward.measured and search.sideways_off(self.current):
@@ -241,7 +249,7 @@ class _Selection:
         pair = None
         if len(self.steps) < self.search.options.greatest_number:
             able = _able_together(self.search, self.effects, self.current, scores)
-            pair = _paired(self.search, able, self.current)
+            pair = _paired(self.search, able, self.current, self._least_n)
         if pair is None:
             self.choices.append(Choice(odds, ()))
             return
@@ -265,18 +273,23 @@ def _size_n(search: Search, score: Score, chosen: Sequence[str], least: float) -
     do the other's work too, the prediction hardly moves."""
     if search.forward.measured or score.size_n > least:
         return score.size_n
-    found, forward = score.candidate.found, search.forward
-    without = found.values.copy()
-    without[found.place_of(score.name)] = score.effect.ideal
-    both, rest = (
-        forward.predict(settings_of(forward, found.effects, v, found.onset)) for v in (found.values, without)
-    )
-    own = rms_n(np.nan_to_num(both - rest)[forward.touches.counted])
-    for effect in (e for e in found.effects if e.name in chosen and own > least):
-        others = search.judge([e for e in found.effects if e is not effect], like=score.candidate)
+    own, effects = _own_n(search, score.candidate, score.effect), score.candidate.found.effects
+    for effect in (e for e in effects if e.name in chosen and own > least):
+        others = search.judge([e for e in effects if e is not effect], like=score.candidate)
         if search.score([effect], score.candidate, others).probability <= search.options.doubt:
             return score.size_n  # instead of it, not beside it
     return own
+
+
+def _own_n(search: Search, candidate: JudgedSet, effect: Effect) -> float:
+    """N rms by which an effect changes the force of a fit, all else as it is there."""
+    found, forward = candidate.found, search.forward
+    without = found.values.copy()
+    without[found.place_of(effect.name)] = effect.ideal
+    both, rest = (
+        forward.predict(settings_of(forward, found.effects, v, found.onset)) for v in (found.values, without)
+    )
+    return rms_n(np.nan_to_num(both - rest)[forward.touches.counted])
 
 
 def _another(score: Score, best: Score) -> bool:
@@ -349,13 +362,16 @@ def _able_together(
     return list({e.hints.phenomenon or e.name: e for e in reversed(able)}.values())
 
 
-def _paired(search: Search, able: Sequence[Effect], current: JudgedSet) -> Score | None:
-    """Two effects that close the gap only together."""
+def _paired(search: Search, able: Sequence[Effect], current: JudgedSet, least_n: float) -> Score | None:
+    """Two effects that close the gap only together; of a simulator's force each changes it by least_n."""
     found: list[Score] = []
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)
         score = search.score([one, two], candidate, current)
-        if search.passes(score):
+        small = not search.forward.measured and any(
+            _own_n(search, candidate, e) <= least_n for e in score.added
+        )
+        if search.passes(score) and not small:
             found.append(score)
     return min(found, key=lambda s: s.candidate.found.loss, default=None)
 
@@ -412,6 +428,26 @@ def _without_idle(
         if score.probability <= search.options.doubt:
             chosen.remove(name)
             current = without
+    return current, chosen
+
+
+def _without_wider(
+    search: Search, chosen: list[str], current: JudgedSet, together: JudgedSet
+) -> tuple[JudgedSet, list[str]]:
+    """What was idle beside a form that can be another's stands instead of that form, where it may be there
+    and the form is not needed beside it: a power of the force has a level of its own, so a plain gain was
+    named a power. together: as chosen before anything was idle."""
+    idle = [e for e in together.found.effects if e not in current.found.effects]
+    for wider, narrow in itertools.product([e for e in current.found.effects if e.hints.any_form], idle):
+        rest = [e for e in current.found.effects if e is not wider]
+        none, alone, both = (
+            search.judge([*rest, *more], like=together) for more in ((), (narrow,), (narrow, wider))
+        )
+        needed = search.passes(search.score([wider], both, alone))
+        if not needed and search.passes(search.score([narrow], alone, none)):
+            search.renew(alone.found)
+            names = [narrow.name if n == wider.name else n for n in chosen]
+            return search.judge(alone.found.effects, like=alone), names
     return current, chosen
 
 

@@ -59,9 +59,9 @@ class Drake(ScriptedAdapter):
     presses = 12
     cannot = (
         "linear tetrahedra alone, which lock near Poisson's ratio 0.5",
-        "one modulus a body",
+        "an object of two moduli: a body has one",
         "a tip without facets: the sphere is a mesh",
-        "no tip that sticks for ever: friction is a number",
+        "a tip that never slides: friction is a number",
     )
     advice = {
         "contact_nodes": "refine the body's mesh under the tip, and the sphere's resolution_hint: "

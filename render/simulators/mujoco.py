@@ -150,9 +150,9 @@ class MuJoCo(SteppedAdapter):
     presses = 12
     cannot = (
         "linear tetrahedra alone: they lock near Poisson's ratio 0.5, so it is 0.45 at most",
-        "one modulus a flex",
+        "an object of two moduli: a soft body (flex) has one",
         "a contact that gives: it is a constraint with a time constant (solref)",
-        "no tip that sticks for ever: friction is a number",
+        "a tip that never slides: friction is a number",
     )
     advice = {
         "contact_stiffness": 'a harder contact, solref="0.004 1" on geom and flex (twice timestep or more): '

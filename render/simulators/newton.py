@@ -65,7 +65,7 @@ class Newton(ScriptedAdapter):
         "a light press: at its best 0.5 mm into a half-space is 1.35 of Hertz's force, 1 mm 1.26",
         "linear tetrahedra alone: they lock near Poisson's ratio 0.5, so it is 0.45 at most",
         "a hard contact: its spring (soft_contact_ke) diverges from some 1e4 N/m on",
-        "no tip that sticks for ever: friction is a number",
+        "a tip that never slides: friction is a number",
     )
     advice = {
         "contact_stiffness": "a larger soft_contact_ke, as far as it converges, on a finer mesh (more "

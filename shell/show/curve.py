@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.mechanics.shape.tetmesh import TetMesh
     from palpate.render.exact import SolvedPlace
 
 
@@ -40,11 +41,11 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
     at = ", ".join(f"{round(float(v), 4) + 0.0:g}" for v in result.touched_at)
     made = result.renderer.model
     if result.on_support:
-        low, high = (", ".join(f"{v:.3g}" for v in f(made.mesh.points, axis=0)) for f in (np.min, np.max))
         yield say.Headline(
             f"this pressed the support, not the object: {result.peak_force_n:.3g} N at most are the support's"
         )
-        yield say.Detail(f"the object lies within ({low}) to ({high}) m: aim `--at` there")
+        there = ",".join(f"{v:.4g}" for v in _on_object(made.mesh, result.touched_at, result.normal))
+        yield say.Detail(f"the object is nearest there, in its upper half: `--at={there}`")
         yield say.Next(["press the object through its middle: the same without `--at`"])
         return
     yield say.Headline(
@@ -67,6 +68,15 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
         later = f"see later whether it stays so: the same press with `--expect {typed_word(written)}`"
     feel = f"feel it: `{touched}`" if touched else None
     yield say.Next([feel or feel_step(made.path, "palpate model FILE -o MODEL"), later])
+
+
+def _on_object(mesh: TetMesh, at: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """(3,) m: of the touchable nodes in the upper half, where no support is met first, that nearest to at."""
+    points = mesh.points[mesh.touchable]
+    height = points @ up
+    points = points[height >= (height.min() + height.max()) / 2]
+    nearest: np.ndarray = points[np.argmin(np.linalg.norm(points - at, axis=1))]
+    return nearest
 
 
 def _solved(exact: SolvedPlace) -> say.Story:

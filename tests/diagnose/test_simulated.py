@@ -14,6 +14,7 @@ from palpate.diagnosis.numerics.contact_stiffness import layer_factors
 from palpate.diagnosis.numerics.lost_contact import lost
 from palpate.diagnosis.numerics.registry import NAMES, numerical, numericals
 from palpate.diagnosis.options import DiagnoseOptions
+from palpate.diagnosis.other_simulator import against_law
 from palpate.diagnosis.other_simulator.against_law import seen_in_samples
 from palpate.diagnosis.other_simulator.declared_parameters import StatedForward, stated_of
 from palpate.diagnosis.other_simulator.forces import (
@@ -28,6 +29,7 @@ from palpate.diagnosis.other_simulator.gap_decomposition import PARAMETER_OF, St
 from palpate.diagnosis.other_simulator.pipeline import Asked, _Weighed, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import PARTS, GapPart, Mended, parameter_words
 from palpate.diagnosis.pipeline import diagnose
+from palpate.diagnosis.search import attribution
 from palpate.diagnosis.verdict.result import EffectEntry
 from palpate.importing.simulated_forces import read_forces
 from palpate.mechanics.contact.dent import FINITE, grid
@@ -440,12 +442,55 @@ def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):
         aligned(Forces(t, -force, "x"), presses, ForcesOptions())
     turned = aligned(Forces(t, -force, "x"), presses, ForcesOptions(simulated_force_on="object"))
     assert turned.usable.all()
-    with pytest.raises(OptionError, match="State --clock-offset 1000"):
+    with pytest.raises(OptionError, match="else --clock-offset 1000"):
         aligned(Forces(t - 1000.0, force, "x"), presses, ForcesOptions(clock_offset_s=None))
     with pytest.raises(OptionError, match="--clock-offset"):
         aligned(Forces(t + 1.0, force, "x"), presses, ForcesOptions())
     with pytest.raises(OptionError, match="zero wherever"):
         aligned(Forces(t, 0 * force, "x"), presses, ForcesOptions())
+
+
+def test_a_force_in_the_place_of_the_time_is_refused_and_no_unlike_clock_suggested(world):
+    """Columns in another order were answered with a clock 54 s off, at a likeness of 0.10."""
+    recording, model, _, force, _ = world
+    t = recording.t
+    with pytest.raises(RecordingError, match=r"t does not increase \(row \d+"):
+        sorted_forces(force[:, 0] + 1e-3 * np.sin(1e4 * t), force, "x")
+    moved = np.concatenate([np.arange(len(t) // 2, len(t)), np.arange(len(t) // 2)])
+    assert "sorted by time" in sorted_forces(t[moved], force[moved], "x").notes[0]
+    unlike = np.abs(np.random.default_rng(0).normal(size=force.shape)) * force[::-1]
+    aligned(Forces(t, np.abs(np.cumsum(unlike, axis=0)), "x"), model.presses, ForcesOptions())
+
+
+def test_an_early_force_by_a_stated_clock_is_early_and_nothing_else(world):
+    """A clock that took 10 ms too much off was named numerical damping."""
+    recording, model, reality, exact, _ = world
+    late = ForcesOptions(clock_offset_s=-0.01)
+    stated = stated_of({"modulus": model.material.young_modulus_pa}, model)
+    asked = Asked(Forces(recording.t, 1.25 * exact, "a simulator"), stated, late)
+    result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    assert set(result.effects) == {"mesh_stiffness", "time_step"}
+    assert any("a lag of the simulator itself cannot be told from it" in note for note in result.notes)
+    step = next(e for e in result.entries if e.name == "time_step")
+    assert step.parameters["delay_s"] == pytest.approx(-0.01, abs=0.002)
+    assert keys_in_words(step).startswith("early by")
+    assert any("come early" in advice for advice in result.advice)
+
+
+def test_a_gain_that_was_idle_beside_a_power_of_the_force_stands_instead_of_it(world, monkeypatch):
+    """A power has a level of its own, so a plain gain was named a force law, then a contact offset."""
+    searches = []
+    found = against_law.attribute
+    monkeypatch.setattr(against_law, "attribute", lambda s, *a, **k: searches.append(s) or found(s, *a, **k))
+    recording, model, reality, exact, _ = world
+    stated = stated_of({"modulus": model.material.young_modulus_pa}, model)
+    asked = Asked(Forces(recording.t, 1.3 * exact, "a simulator"), stated, OWN_CLOCK)
+    diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    gain, power = numerical("mesh_stiffness"), numerical("force_law")
+    search = searches[0]
+    wide, both = search.judge([power]), search.judge([gain, power])
+    left, names = attribution._without_wider(search, ["force_law"], wide, both)
+    assert names == ["mesh_stiffness"] and left.found.names == ("mesh_stiffness",)
 
 
 def test_forces_in_another_frame_or_unit_are_taken_where_they_show_it_and_say_so(world):

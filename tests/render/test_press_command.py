@@ -69,6 +69,18 @@ def test_a_point_in_millimetres_is_asked_back(model_folder, capsys):
     assert "--at 0.01,0.005,0.03" in capsys.readouterr().err
 
 
+def test_a_direction_away_from_the_object_is_answered_with_the_other_way(model_folder, capsys):
+    assert main(["press", model_folder, "--at", "0,0,0.03", "--direction", "0,0,1"]) == 2
+    assert "--direction=0,0,-1" in capsys.readouterr().err
+
+
+def test_beside_the_object_a_place_on_it_is_named_that_can_be_pressed(model_folder, capsys):
+    """The corner of its box was named, which may lie beside it."""
+    assert main(["press", model_folder, *BESIDE]) == 1
+    there = capsys.readouterr().out.split("`--at=")[1].split("`")[0]
+    assert main(["press", model_folder, f"--at={there}", *BESIDE[2:]]) == 0
+
+
 def test_a_modulus_in_kilopascals_is_asked_back_and_no_small_number_is_lost(model_folder, capsys):
     assert main(["press", model_folder, *DOWN, "--modulus", "5"]) == 0
     told = capsys.readouterr()
