@@ -167,7 +167,7 @@ def _assembled(both: np.ndarray, updates: list[tuple[np.ndarray, np.ndarray]]) -
 
 
 @njit(cache=True)
-def _add(whole, places, update):  # type: ignore[no-untyped-def]
+def _add(whole, places, update):
     """Add the lower triangle of an update (b, b) at ascending places (b,)."""
     for j in range(len(places)):
         for i in range(j, len(places)):
@@ -204,7 +204,7 @@ def _tree(ordered: sp.csr_matrix, part: int) -> tuple[list[np.ndarray], list[np.
 
 
 @njit(cache=True)
-def _homes(starts, neighbours, part, front):  # type: ignore[no-untyped-def]
+def _homes(starts, neighbours, part, front):
     """(n,) of each place: the last place of its front, or less than 0, the same within a part."""
     n = len(starts) - 1
     parent, ancestor = np.full(n, -1), np.full(n, -1)

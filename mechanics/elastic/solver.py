@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -51,6 +52,7 @@ class Solver:
         if springs is not None:
             full = full + springs.tobsr((3, 3))
         self.matrix = _of_nodes(full, self.free[::3] // 3)
+        self._factor: Any
         try:
             if self.backend == "pardiso" and len(self.free) < 3 * LARGE:
                 self._factor = pardiso.Pardiso(self.matrix, group=3)
@@ -92,14 +94,14 @@ class Solver:
         of a large mesh, where the factor is Pardiso's. What a group gives does not hang, to the bit, on which
         others there are.
         """
-        if sp.issparse(right):
+        if isinstance(right, sp.csr_matrix):
             f, r, c = right.shape[0], right.shape[1] // 3, 3
         else:
             f, r, c = right.shape
             right = right.transpose(1, 2, 0).reshape(r * c, f).T  # without a copy where it is in this order
         if isinstance(self._factor, DissectedFactor):
             return self._factor.quadratic_forms(sp.csr_matrix(right), c)
-        flat = right.toarray(order="F") if sp.issparse(right) else right
+        flat: np.ndarray = right.toarray(order="F") if isinstance(right, sp.csr_matrix) else right
         if self.backend == "pardiso":
             return products(self._factor.half_solve(flat), c)
         solution = self.solve_free(flat).reshape(f, r, c)

@@ -44,8 +44,9 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
         yield say.Headline(
             f"this pressed the support, not the object: {result.peak_force_n:.3g} N at most are the support's"
         )
-        there = ",".join(f"{v:.4g}" for v in _on_object(made.mesh, result.touched_at, result.normal))
-        yield say.Detail(f"the object is nearest there, in its upper half: `--at={there}`")
+        nearest = _on_object(made.mesh, result.touched_at, np.asarray(result.normal))
+        place = ",".join(f"{v:.4g}" for v in nearest)
+        yield say.Detail(f"the object is nearest there, in its upper half: `--at={place}`")
         yield say.Next(["press the object through its middle: the same without `--at`"])
         return
     yield say.Headline(
