@@ -171,8 +171,12 @@ def explore(
     options = options or ExplorationOptions()
     random = np.random.default_rng(seed)
     trace = base_tracing(model, options)
-    times, points = [0.0], [trace[0] + 0.03 * model.support.normal]
-    _go(times, points, trace[0], options.travel_speed_m_per_s)
+    # from beside the object: what begins in a wall is not felt until it has left it
+    out = trace[0] - trace.mean(axis=0)
+    beside = trace[0] + options.clearance_m * out / np.linalg.norm(out)
+    times, points = [0.0], [beside + 0.03 * model.support.normal]
+    _go(times, points, beside, options.travel_speed_m_per_s)
+    _go(times, points, trace[0], options.tracing_speed_m_per_s)
     for point in trace[1:]:
         _go(times, points, point, options.tracing_speed_m_per_s)
     traced_s = times[-1]

@@ -46,6 +46,8 @@ OF_A_KNOWN_OBJECT = (
     Way("it is flat, deep and wide compared with every contact", {"half_space": True}),
 )
 """Ways that need no traced base."""
+OF_A_SHAPE = OF_A_KNOWN_OBJECT[:1]
+"""Those where walls were pressed too: nothing flat has them."""
 ALL_THE_SAME = Way("go on all the same", {"force": True})
 
 

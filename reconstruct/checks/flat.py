@@ -6,13 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from palpate.reconstruction.checks.finding import ALL_THE_SAME, OF_A_KNOWN_OBJECT, Finding
+from palpate.reconstruction.checks.finding import ALL_THE_SAME, OF_A_SHAPE, Finding
 from palpate.reconstruction.geometry.slab import off_the_plane
 from palpate.reconstruction.geometry.stated import GeometryOptions
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s3_contacts.sliding_presses import FLAT
-
-_SHAPED = tuple(way for way in OF_A_KNOWN_OBJECT if "shape" in way.options)
 
 
 def flat(measured: Measured, geometry: GeometryOptions) -> Iterator[Finding]:
@@ -29,5 +27,5 @@ def flat(measured: Measured, geometry: GeometryOptions) -> Iterator[Finding]:
         "give its shape with --shape, or trace its base",
         np.inf,
         np.inf,
-        ways=(*_SHAPED, ALL_THE_SAME),
+        ways=(*OF_A_SHAPE, ALL_THE_SAME),
     )

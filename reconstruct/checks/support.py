@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from palpate.mechanics.statistics import spread_about_zero, weighted_median
-from palpate.reconstruction.checks.finding import ALL_THE_SAME, OF_A_KNOWN_OBJECT, Finding
+from palpate.reconstruction.checks.finding import ALL_THE_SAME, OF_A_KNOWN_OBJECT, OF_A_SHAPE, Finding, Way
 from palpate.reconstruction.measured import Measured
 from palpate.reconstruction.steps.s2_base import LEAN
 from palpate.reconstruction.steps.s3_contacts.on_support import supported
@@ -22,9 +22,6 @@ _STEEP = 0.85
 """A wall's normal rises from the horizontal by less than this cosine."""
 
 
-_WITHOUT_BASE = (*OF_A_KNOWN_OBJECT, ALL_THE_SAME)
-
-
 def support(measured: Measured) -> Iterator[Finding]:
     """A tip below the support; a base of another size than the walls that stand on it."""
     boundary = measured.boundary
@@ -34,6 +31,12 @@ def support(measured: Measured) -> Iterator[Finding]:
     yield from _below(measured)
     yield from _hollow(measured)
     yield from _size(measured)
+
+
+def _without_base(measured: Measured) -> tuple[Way, ...]:
+    """Ways to go on without the traced base."""
+    walls = np.abs(measured.presses.contact_normal @ measured.boundary.support_normal) < _STEEP
+    return (*(OF_A_KNOWN_OBJECT if walls.sum() < _LEAST else OF_A_SHAPE), ALL_THE_SAME)
 
 
 def _beside(measured: Measured) -> Iterator[Finding]:
@@ -51,7 +54,7 @@ def _beside(measured: Measured) -> Iterator[Finding]:
         np.inf,
         (float(t[a]), float(t[b - 1])),
         ("fx", "fy", "fz"),
-        _WITHOUT_BASE,
+        _without_base(measured),
     )
 
 
@@ -80,7 +83,7 @@ def _below(measured: Measured) -> Iterator[Finding]:
         np.inf,
         (float(recording.t[a]), float(recording.t[b])),
         ("x", "y", "z"),
-        _WITHOUT_BASE,
+        _without_base(measured),
     )
 
 
@@ -102,7 +105,7 @@ def _hollow(measured: Measured) -> Iterator[Finding]:
         np.inf,
         (float(t[a]), float(t[b - 1])),
         ("x", "y", "z"),
-        _WITHOUT_BASE,
+        _without_base(measured),
     )
 
 
@@ -152,7 +155,7 @@ def _size(measured: Measured) -> Iterator[Finding]:
         float(min(0.5 * (centre / error) ** 2 / np.log(10), 300)),
         (float(t[a]), float(t[b - 1])),
         ("x", "y", "z"),
-        _WITHOUT_BASE,
+        _without_base(measured),
     )
 
 

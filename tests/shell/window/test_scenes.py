@@ -153,6 +153,9 @@ def test_exploration_traces_the_foot_and_presses_outside_in(block: Model) -> Non
     angle = np.unwrap(np.arctan2(trace[:, 1], trace[:, 0]))
     assert angle[-1] - angle[0] > 2 * np.pi
     path, traced_s = explore(block, options)
+    # what begins in a wall is not felt: the way round the foot went by without a push
+    outside = np.maximum(np.abs(path.waypoints_m[:2, :2]) - 0.04, 0.0)
+    assert (np.linalg.norm(outside, axis=1) > block.tool.tip_radius_m).all()
     inside = (np.abs(path.waypoints_m[:, :2]) < 0.04 + block.tool.tip_radius_m).all(axis=1)
     inside &= path.waypoints_m[:, 2] < 0.04 + block.tool.tip_radius_m
     presses = path.times_s[inside & (path.times_s > traced_s)]
