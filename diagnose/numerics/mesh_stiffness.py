@@ -75,7 +75,7 @@ EFFECT = NumericalEffect(
     keys_in_words=_words,
     change=_change,
     advice="check that the modulus is the one stated, and the force's unit; refine the mesh, use quadratic "
-    "elements, or lower Poisson's ratio by steps (0.49, 0.47, 0.45)",
+    "elements, or lower a Poisson's ratio above 0.45 by steps",
     how_much=_how_much,
     opposite=_too_soft,
     hints=SearchHints(),

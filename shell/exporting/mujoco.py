@@ -65,7 +65,9 @@ def text_of(subject: Subject, numbers: str = FILE_SETTINGS, settings: str = BEST
 def write(path: Path, subject: Subject) -> tuple[str, ...]:
     """Write the scene; what it cannot say."""
     path.write_text(text_of(subject), encoding="utf-8")
+    move = ", ".join(f"{value:.4g}" for value in subject.pressed - subject.near)
     return (
+        f"the tip waits above the object: `data.ctrl[:] = [{move}]` presses it in, within some 20 ms",
         *subject.run_notes(MuJoCo, FILE_SETTINGS),
         "a flex softens under a deep dent: compare presses of a sixth of the tip's radius, or set elastic3d "
         "of its MjSpec to 1 (stable neo-Hookean), which no file can say",

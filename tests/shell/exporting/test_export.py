@@ -255,6 +255,21 @@ def test_mujocos_viewer_begins_with_the_whole_object_in_sight_and_in_its_colour(
     assert scene.flex_rgba[0] == pytest.approx(np.array([0xEA, 0xD7, 0xBF, 255]) / 255, abs=2e-3)
 
 
+def test_mujocos_tip_is_pressed_by_the_line_that_is_printed(tmp_path):
+    """It stood above the object for ever, and how to move it was not said."""
+    mujoco = pytest.importorskip("mujoco")
+    path = tmp_path / "m.xml"
+    notes = pp.export(block(), "mujoco", path, at=(0, 0, 0.03), progress=False)
+    (told,) = (found for note in notes if (found := re.search(r"`data\.ctrl\[:\] = \[(.*)\]`", note)))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    data.ctrl[:] = [float(value) for value in told[1].split(", ")]
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    assert data.body("tip").xpos == pytest.approx(_pressed(path), abs=2e-5)
+    assert force_on_tip(mujoco, model, data)[2] > 0.01
+
+
 def test_mujocos_file_gives_the_force_that_is_replayed(tmp_path):
     """The file, loaded and stepped by MuJoCo alone with its tip led by hand, against the renderer on the same
     path: down and aside, with a Poisson's ratio that a flex does not bear, a friction that never slips and a
