@@ -11,6 +11,7 @@ linear tetrahedra lock.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,7 @@ from palpate.render.options import BEST, DOCUMENTED
 from palpate.render.simulators.base import SteppedAdapter, Touch
 from palpate.render.simulators.tunable import EDGES, Tunable, density
 
+_LOG = logging.getLogger(__name__)
 POISSON_LIMIT = 0.45
 """Beyond it linear tetrahedra lock, and the solver of the elastic forces does not converge at 0.49."""
 GREY = "0.5 0.5 0.5 1"
@@ -172,6 +174,8 @@ class MuJoCo(SteppedAdapter):
     def scene(self, mesh: TetMesh, radius_m: float) -> Any:
         import mujoco
 
+        # it prints them otherwise, and writes a MUJOCO_LOG.TXT beside the user's files
+        mujoco.set_mju_user_warning(_LOG.info)
         spec = mujoco.MjSpec.from_string(scene_xml(mesh, radius_m, self.stated, self.own))
         for flex in spec.flexes:
             flex.elastic3d = round(self.own.material) - 1

@@ -72,6 +72,21 @@ def test_a_tip_that_sticks_to_mujocos_object_is_pushed_back(model, tmp_path, mon
     assert sticks.peak_force_n > 0.8 * pressed(model, "mujoco", friction=1.0).peak_force_n
 
 
+def test_what_mujoco_warns_of_goes_to_the_log_and_into_no_file(model, tmp_path, monkeypatch, caplog):
+    """It was printed for each press, and MUJOCO_LOG.TXT stood beside the user's files."""
+    mujoco = pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    pressed(model, "mujoco")
+    scene = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><body><freejoint/><geom size="0.01"/></body></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(scene)
+    data.qvel[:] = 1e12
+    with caplog.at_level("INFO"):
+        mujoco.mj_step(scene, data)
+    assert "unstable" in caplog.text and not list(tmp_path.iterdir())
+
+
 def test_mujoco_pushes_back_and_a_harder_contact_more(model, tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)  # it leaves its warnings in a file where it runs
