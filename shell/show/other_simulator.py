@@ -196,6 +196,7 @@ def story(result: SimulatedGap) -> say.Story:
     )
     yield say.Headline(f"verdict: {verdict(result)}", on=say.TEXT)
     yield say.Headline(lead(result), on=say.PAGE)
+    yield say.Sentence(_how_sure(result), on=say.PAGE)
     read_as = result.simulator.axes, result.simulator.unit
     if read_as != (AS_RECORDED, "N"):
         yield say.Sentence(f"its forces are read as {' in '.join(read_as)}, not x,y,z in N (see the notes)")
@@ -365,6 +366,14 @@ def lead(result: SimulatedGap) -> str:
     return f"{off}. Above all: {'; then: '.join(said)}." + (
         f" Not ruled out: {spoken(told_rivals(result), 'or')}." if told_rivals(result) else ""
     )
+
+
+def _how_sure(result: SimulatedGap) -> str:
+    """How large the gap is beside the force, and how likely each name is."""
+    size = f"The gap is {percent(result.gap_before_n / result.touches.force_rms_n)} of the measured force"
+    sure = [(e.name, percent(e.probability)) for e in result.entries if e.name in result.effects]
+    each = ", ".join(f"{spaced(name)} {likely}" for name, likely in sure)
+    return f"{size}. How sure each name is: {each}." if each else f"{size}."
 
 
 def _settled(result: SimulatedGap) -> str:

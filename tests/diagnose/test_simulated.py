@@ -44,7 +44,8 @@ from palpate.mechanics.quantities import parse_unit
 from palpate.mechanics.shape.tetmesh import box_mesh
 from palpate.render.registry import create
 from palpate.render.replay import replay
-from palpate.show.other_simulator import keys_in_words, lead, part_words, verdict
+from palpate.show.other_simulator import keys_in_words, lead, part_words, story, verdict
+from palpate.show.story import PAGE, Sentence
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -290,7 +291,10 @@ def test_a_gap_that_nothing_explains_is_said_first(world):
     assert "most of the gap is numerics" in again.lines()[0]
     little = dataclasses.replace(result, mended=Mended("settings best", 0.9 * result.gap_before_n, ()))
     assert lead(little) == lead(result)
-    assert "Above all: " in lead(judged(world, 1.5 * world[3]))
+    stiff = judged(world, 1.5 * world[3])
+    assert "Above all: " in lead(stiff)
+    told = next(each.text for each in story(stiff) if isinstance(each, Sentence) and each.on == PAGE)
+    assert re.fullmatch(r"The gap is \d+\s% of the measured force\. How sure each name is: .*\d\s%\.", told)
     assert "Nothing stands out" in lead(judged(world, world[3]))
 
 
