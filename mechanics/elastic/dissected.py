@@ -66,13 +66,14 @@ class DissectedFactor:
         for k, own in enumerate(owns):
             above[own] = k
 
+        beyond = 2.0 * float(abs(matrix).sum(axis=1).max())
         self._parts = []
         for inside in parts:
             nodes = np.sort(order[inside])
             border = _met(place, graph, nodes)
             rows = _spread(nodes)
             near = matrix[rows]
-            factor = pardiso.SchurFactor(near[:, rows], near[:, self._kept[_spread(border)]])
+            factor = pardiso.SchurFactor(near[:, rows], near[:, self._kept[_spread(border)]], beyond)
             after = above[min(border, default=-1)]
             waiting[after].append((border, factor.taken()))
             self._parts.append(_Part(rows, _spread(border), after, factor))

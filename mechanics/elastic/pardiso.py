@@ -254,16 +254,15 @@ def dissection(graph: sp.csr_matrix) -> np.ndarray:
 class SchurFactor:
     """A matrix (k, k), CSR, both triangles, and what it takes from those that it borders on.
 
-    border: (k, b), CSR, B.
+    border: (k, b), CSR, B. beyond: greater than all eigenvalues of the whole; it stands on the border's
+    diagonal, as the library wants what is left there positive definite too.
     """
 
-    def __init__(self, matrix: sp.csr_matrix, border: sp.csr_matrix) -> None:
+    def __init__(self, matrix: sp.csr_matrix, border: sp.csr_matrix, beyond: float) -> None:
         k, b = border.shape
         self._own = k
-        upper = sp.vstack(
-            [sp.hstack([sp.triu(matrix), border]), sp.hstack([sp.csr_matrix((b, k)), sp.eye(b)])]
-        )
-        upper = upper.tocsr()
+        self._beyond = beyond * np.eye(b)
+        upper = sp.bmat([[sp.triu(matrix), border], [None, sp.csr_matrix(self._beyond)]], format="csr")
         upper.sort_indices()
         rows, columns = upper.indptr.astype(np.int32), upper.indices.astype(np.int32)
         self._phases = _Phases(_DEFINITE, rows, columns, np.arange(k, k + b))
@@ -271,8 +270,9 @@ class SchurFactor:
 
     def taken(self) -> np.ndarray:
         """-B' A^-1 B (b, b), columns contiguous; asked once, and not kept."""
-        left, self._left = self._left, np.zeros((0, 0))
-        return (left - np.eye(len(left))).T
+        taken = self._left - self._beyond
+        self._left = self._beyond = np.zeros((0, 0))
+        return taken.T
 
     def forward(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(L^-1 b (k, r), -B' A^-1 b (b, r)) of right-hand sides (k, r)."""

@@ -252,7 +252,7 @@ def read_recording(path: Path | str) -> Recording:
             position_resolution_m=_optional_float(sensor.get("position_resolution_m")),
             object_name=thing.get("name", "object"),
             poisson_ratio=_optional_float(thing.get("poisson_ratio")),
-            base_model=None if base is None else (description.parent / base),
+            base_model=None if base is None else Path(os.path.normpath(description.parent / base)),
             truth=table.get("truth"),
             path=samples,
             sha256=sha256_of_file(samples),
@@ -300,7 +300,7 @@ def stated_object(recording: Recording) -> dict[str, Any]:
     thing = recording.description.get("object", {})
     stated = {key: thing[key] for key in GEOMETRY if key in thing} if isinstance(thing, Mapping) else {}
     if "shape" in stated and recording.path is not None:
-        stated["shape"] = str(recording.path.parent / str(stated["shape"]))
+        stated["shape"] = os.path.normpath(recording.path.parent / str(stated["shape"]))
     return stated
 
 
