@@ -65,7 +65,7 @@ def text_of(subject: Subject, numbers: str = FILE_SETTINGS, settings: str = BEST
 def write(path: Path, subject: Subject) -> tuple[str, ...]:
     """Write the scene; what it cannot say."""
     path.write_text(text_of(subject), encoding="utf-8")
-    move = ", ".join(f"{value:.4g}" for value in subject.pressed - subject.near)
+    move = ", ".join(f"{round(float(value), 7) + 0.0:g}" for value in subject.pressed - subject.near)
     return (
         f"the tip waits above the object: `data.ctrl[:] = [{move}]` presses it in, within some 20 ms",
         *subject.run_notes(MuJoCo, FILE_SETTINGS),
