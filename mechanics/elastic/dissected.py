@@ -19,7 +19,8 @@ PART = 250
 """Nodes of a part, at most."""
 _FRONT = 128
 """Nodes that a front eliminates, at most."""
-_LANES = 8
+_LANES = 24
+"""Columns that a front takes at once: whole groups of three, and whole lanes of a processor."""
 
 
 @dataclass(eq=False)
@@ -141,7 +142,7 @@ class DissectedFactor:
             groups = np.flatnonzero(met[k])
             if len(groups):
                 columns = _spread(groups, each)
-                own = _padded(kept[front.own][:, columns])
+                own = pardiso.in_lanes(kept[front.own][:, columns], lanes=_LANES)
                 pardiso.solve_lower(front.lower, own)
                 forms[groups] += products(own[:, : len(columns)], each)
                 passed = pardiso.product(front.below, own)
@@ -173,13 +174,6 @@ def _add(whole, places, update):
     for j in range(len(places)):
         for i in range(j, len(places)):
             whole[places[i], places[j]] += update[i, j]
-
-
-def _padded(columns: np.ndarray) -> np.ndarray:
-    """With columns of zeros up to a number that the library takes at once, in Fortran's order."""
-    whole = np.zeros((len(columns), -(-columns.shape[1] // 24) * 24), order="F")
-    whole[:, : columns.shape[1]] = columns
-    return whole
 
 
 def products(half: np.ndarray, each: int) -> np.ndarray:

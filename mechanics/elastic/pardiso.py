@@ -69,6 +69,15 @@ def invert(matrix: np.ndarray) -> int:
     return 0
 
 
+def in_lanes(columns: np.ndarray, rows: int | None = None, lanes: int = _LANES) -> np.ndarray:
+    """Columns (k, r) with zeros below, up to so many rows, and beside, up to what a processor takes at
+    once; in Fortran's order."""
+    k, r = columns.shape
+    whole = np.zeros((k if rows is None else rows, -(-r // lanes) * lanes), order="F")
+    whole[:k, :r] = columns
+    return whole
+
+
 def eliminate(front: np.ndarray, width: int) -> int:
     """The first unknowns of a symmetric positive definite front (m, m), in its lower triangle, columns
     contiguous: L of them and, below, of the others, and what is left of these; 0, or the failing row."""
@@ -218,12 +227,10 @@ class Pardiso(_Handle):
 
         What a column gives does not hang, to the bit, on how many others there are.
         """
-        count = right.shape[1]
-        whole = np.zeros((len(right), -(-count // _LANES) * _LANES), order="F")
-        whole[:, :count] = right
+        whole = in_lanes(right)
         half = np.empty_like(whole, order="F")
         self._call(331, whole, half, whole.shape[1])
-        return half[:, :count]
+        return half[:, : right.shape[1]]
 
 
 class _Order(_Handle):
@@ -276,16 +283,12 @@ class SchurFactor:
 
     def forward(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(L^-1 b (k, r), -B' A^-1 b (b, r)) of right-hand sides (k, r)."""
-        count = right.shape[1]
-        whole = np.zeros((self._phases.size, -(-count // _LANES) * _LANES), order="F")
-        whole[: self._own, :count] = right
-        half = self._phases.solve_many(331, whole)[:, :count]
+        half = self._phases.solve(331, in_lanes(right, self._phases.size))[:, : right.shape[1]]
         return half[: self._own], half[self._own :]
 
     def backward(self, half: np.ndarray, border: np.ndarray) -> np.ndarray:
         """x (k, r) from L^-1 b (k, r) and the border's x (b, r)."""
-        whole = np.asfortranarray(np.concatenate([half, border]))
-        return self._phases.solve_many(333, whole)[: self._own]
+        return self._phases.solve(333, np.concatenate([half, border]))[: self._own]
 
 
 class PartialFactor:
@@ -356,14 +359,10 @@ class _Phases:
         return 0.5 * (schur + schur.T)
 
     def solve(self, phase: int, right: np.ndarray) -> np.ndarray:
-        right, solution = np.ascontiguousarray(right, dtype=np.float64), np.zeros(self.size)
-        self._call(phase, right, solution)
-        return solution
-
-    def solve_many(self, phase: int, right: np.ndarray) -> np.ndarray:
-        """The same for (n, r), in Fortran's order."""
+        """What the library's phase makes of (n,) or (n, r)."""
+        right = np.asfortranarray(right, dtype=np.float64)
         solution = np.zeros_like(right)
-        self._call(phase, right, solution, right.shape[1])
+        self._call(phase, right, solution, 1 if right.ndim == 1 else right.shape[1])
         return solution
 
     def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int = 1) -> None:

@@ -13,7 +13,7 @@ from palpate.mechanics.effects import stiffness_field
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.operations._written import open_words
-from palpate.reconstruction.checks.finding import OF_A_KNOWN_OBJECT, Way
+from palpate.reconstruction.checks.finding import OF_A_SHAPE, Way
 from palpate.reconstruction.pipeline import Reconstruction
 from palpate.reconstruction.steps.s4_surface import Surface
 from palpate.reconstruction.steps.s6_one_d import low_passed
@@ -323,7 +323,7 @@ def mending(result: Reconstruction) -> list[Way]:
     ways, held_out = [], result.held_out
     made = result.model.provenance["options"]
     if result.placed is not None and result.placed.doubt:
-        ways += [way for way in OF_A_KNOWN_OBJECT if "shape" in way.options]
+        ways += OF_A_SHAPE
     elif result.doubt and result.placed is not None and "file" in result.placed.about:
         up = "-z" if made["geometry"]["up"] != "-z" else "+z"
         ways.append(Way(f"its file stands another way, here {up} up", {"up": up}))
