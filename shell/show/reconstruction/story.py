@@ -320,7 +320,8 @@ def mending(result: Reconstruction) -> list[Way]:
     """Ways to an answer that can be relied on: another geometry where touches lie off the flat one that was
     given, another way up of a shape's file whose model does not predict, a field of the modulus where one is
     beaten by a 1D model."""
-    ways, held_out = [], result.held_out
+    ways: list[Way] = []
+    held_out = result.held_out
     made = result.model.provenance["options"]
     if result.placed is not None and result.placed.doubt:
         ways += OF_A_SHAPE
