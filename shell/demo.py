@@ -1,4 +1,4 @@
-"""The main job in one go: reconstruct, precompute, replay, feel for ten seconds, diagnose."""
+"""The main job in one go: reconstruct, precompute, replay, feel for some seconds, diagnose."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 class DemoOptions:
     """What a person may want otherwise."""
 
-    seconds: float = option(10.0, "how long the 1 kHz loop runs against the simulated hand", unit="s")
+    seconds: float = option(4.0, "how long the 1 kHz loop runs against the simulated hand", unit="s")
     renderer: str = option("fem", "which renderer serves the loop and the replay")
     diagnosis: bool = option(True, "diagnose the gap too", flag="--diagnosis")
     fast: bool = option(True, "by fewer effects")

@@ -44,12 +44,14 @@ def modes_of(table: np.ndarray, size: np.ndarray, error: float, most: int = MOST
     scaled = table / size
     _, vectors = np.linalg.eigh(scaled.T @ scaled)
     vectors = vectors[:, ::-1]
+    rest = scaled.copy()
     for count in range(1, min(most, vectors.shape[1]) + 1):
-        basis = vectors[:, :count]
-        weights = scaled @ basis
-        if np.quantile(np.abs(scaled - weights @ basis.T), 0.999) <= error:
+        mode = vectors[:, count - 1]
+        rest -= np.outer(scaled @ mode, mode)
+        if np.count_nonzero(np.abs(rest) > error) <= rest.size / 1000:
             break
-    return Modes(weights, basis.T * size)
+    basis = vectors[:, :count]
+    return Modes(scaled @ basis, basis.T * size)
 
 
 class PackedArrays:
