@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import os
 import sys
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
@@ -131,51 +132,51 @@ def _pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-class _Handle:
-    """One handle of the library for an upper triangle (n, n), CSR, sorted; frees MKL's memory when it
-    dies."""
+_NOTHING = np.zeros(1)
 
-    def __init__(self, upper: sp.csr_matrix, kind: int = _DEFINITE) -> None:
-        self._kind = kind
-        self.size = upper.shape[0]
+
+class _Handle:
+    """One handle of the library for an upper triangle (n, n), CSR, sorted; frees MKL's memory when it dies.
+
+    kind: of the matrix, as the library counts them. settings: {place: value} beside those that all share.
+    """
+
+    def __init__(
+        self, upper: sp.csr_matrix, kind: int = _DEFINITE, settings: Mapping[int, int] | None = None
+    ) -> None:
+        self.kind, self.size = kind, upper.shape[0]
         self._values = np.ascontiguousarray(upper.data, dtype=np.float64)
-        self._rows = upper.indptr.astype(np.int32)
-        self._columns = upper.indices.astype(np.int32)
-        self._handle = np.zeros(64, dtype=np.int64)
-        self._iparm = np.zeros(64, dtype=np.int32)
-        self._iparm[0] = 1  # the values below, not the library's defaults
-        self._iparm[1] = 2  # nested dissection
-        self._iparm[17] = -1  # tell the number of nonzeros in the factor
-        self._iparm[34] = 1  # zero-based indices
+        self._rows, self._columns = upper.indptr.astype(np.int32), upper.indices.astype(np.int32)
+        self._handle, self._iparm = np.zeros(64, dtype=np.int64), np.zeros(64, dtype=np.int32)
+        # values of our own, nested dissection, zero-based indices
+        for place, value in {0: 1, 1: 2, 34: 1, **(settings or {})}.items():
+            self._iparm[place] = value
         self._perm = np.zeros(self.size, dtype=np.int32)
 
-    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int) -> None:
+    def phase(self, phase: int, right: np.ndarray) -> np.ndarray:
+        """What the library's phase makes of (n,) or (n, r)."""
+        right = np.asfortranarray(right, dtype=np.float64)
+        solution = np.zeros_like(right)
+        self._call(phase, right, solution, 1 if right.ndim == 1 else right.shape[1])
+        return solution
+
+    def _call(
+        self, phase: int, right: np.ndarray = _NOTHING, solution: np.ndarray = _NOTHING, count: int = 1
+    ) -> None:
         error = ctypes.c_int32(0)
         _mkl().pardiso(
-            _pointer(self._handle),
-            _integer(1),
-            _integer(1),
-            _integer(self._kind),
-            _integer(phase),
-            _integer(self.size),
-            _pointer(self._values),
-            _pointer(self._rows),
-            _pointer(self._columns),
-            _pointer(self._perm),
-            _integer(count),
-            _pointer(self._iparm),
-            _integer(0),
-            _pointer(right),
-            _pointer(solution),
-            ctypes.byref(error),
-        )
+            _pointer(self._handle), _integer(1), _integer(1), _integer(self.kind), _integer(phase),
+            _integer(self.size), _pointer(self._values), _pointer(self._rows), _pointer(self._columns),
+            _pointer(self._perm), _integer(count), _pointer(self._iparm), _integer(0), _pointer(right),
+            _pointer(solution), ctypes.byref(error),
+        )  # fmt: skip
         if error.value:
             raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")
 
     def free(self) -> None:
         """Release the factor."""
         if self._handle.any():
-            self._call(-1, np.zeros(1), np.zeros(1), 0)
+            self._call(-1)
             self._handle[:] = 0
 
     def __del__(self) -> None:
@@ -204,7 +205,8 @@ class Pardiso(_Handle):
     ) -> None:
         upper = sp.triu(matrix, format="csr")
         upper.sort_indices()
-        super().__init__(upper, _DEFINITE if definite else _INDEFINITE)
+        # tell the number of nonzeros in the factor
+        super().__init__(upper, _DEFINITE if definite else _INDEFINITE, {17: -1})
         if schur is not None:
             self._perm[schur] = 1
             self._iparm[35] = 1  # only the Schur complement, no factors to solve with
@@ -212,25 +214,19 @@ class Pardiso(_Handle):
             groups = dissection(graph_of_groups(matrix, group))
             self._perm = (group * groups[:, None] + np.arange(group, dtype=np.int32)).ravel()
             self._iparm[4] = 1  # in that order
-        self._call(12, np.zeros(1), np.zeros(1) if out is None else out, 0)
+        self._call(12, solution=_NOTHING if out is None else out)
         self.factor_nonzeros = int(self._iparm[17])
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solutions for right-hand sides (n,) or (n, r)."""
-        right = np.asfortranarray(right, dtype=np.float64)
-        solution = np.empty_like(right, order="F")
-        self._call(33, right, solution, 1 if right.ndim == 1 else right.shape[1])
-        return solution
+        return self.phase(33, right)
 
     def half_solve(self, right: np.ndarray) -> np.ndarray:
         """L^-1 P b for right-hand sides (n, r), A = P' L L' P: b' A^-1 c is the product of two halves.
 
         What a column gives does not hang, to the bit, on how many others there are.
         """
-        whole = in_lanes(right)
-        half = np.empty_like(whole, order="F")
-        self._call(331, whole, half, whole.shape[1])
-        return half[:, : right.shape[1]]
+        return self.phase(331, in_lanes(right))[:, : right.shape[1]]
 
 
 class _Order(_Handle):
@@ -239,7 +235,7 @@ class _Order(_Handle):
     def found(self) -> np.ndarray:
         """(n,) int32, each unknown's place."""
         self._iparm[4] = 2  # write it
-        self._call(11, np.zeros(1), np.zeros(1), 0)
+        self._call(11)
         return self._perm
 
 
@@ -271,8 +267,7 @@ class SchurFactor:
         self._beyond = beyond * np.eye(b)
         upper = sp.bmat([[sp.triu(matrix), border], [None, sp.csr_matrix(self._beyond)]], format="csr")
         upper.sort_indices()
-        rows, columns = upper.indptr.astype(np.int32), upper.indices.astype(np.int32)
-        self._phases = _Phases(_DEFINITE, rows, columns, np.arange(k, k + b))
+        self._phases = _Phases(upper, np.arange(k, k + b))
         self._left = self._phases.factorise(upper.data)
 
     def taken(self) -> np.ndarray:
@@ -283,12 +278,12 @@ class SchurFactor:
 
     def forward(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(L^-1 b (k, r), -B' A^-1 b (b, r)) of right-hand sides (k, r)."""
-        half = self._phases.solve(331, in_lanes(right, self._phases.size))[:, : right.shape[1]]
+        half = self._phases.phase(331, in_lanes(right, self._phases.size))[:, : right.shape[1]]
         return half[: self._own], half[self._own :]
 
     def backward(self, half: np.ndarray, border: np.ndarray) -> np.ndarray:
         """x (k, r) from L^-1 b (k, r) and the border's x (b, r)."""
-        return self._phases.solve(333, np.concatenate([half, border]))[: self._own]
+        return self._phases.phase(333, np.concatenate([half, border]))[: self._own]
 
 
 class PartialFactor:
@@ -299,9 +294,7 @@ class PartialFactor:
     """
 
     def __init__(self, upper: sp.csr_matrix, kept: np.ndarray) -> None:
-        self.size, self._kept = upper.shape[0], np.asarray(kept)
-        self._rows = upper.indptr.astype(np.int32)
-        self._columns = upper.indices.astype(np.int32)
+        self.size, self._upper, self._kept = upper.shape[0], upper, np.asarray(kept)
         self._kind = _DEFINITE
         self._now: _Phases | None = None
 
@@ -318,64 +311,36 @@ class PartialFactor:
 
     def _refresh(self, values: np.ndarray) -> np.ndarray:
         if self._now is None or self._now.kind != self._kind:
-            self._now = _Phases(self._kind, self._rows, self._columns, self._kept)
+            self._now = _Phases(self._upper, self._kept, self._kind)
         return self._now.factorise(values)
 
     def forward(self, right: np.ndarray) -> np.ndarray:
         """(n,) what `backward` needs of b (n,); its kept entries are b_k - A_ki A_ii^-1 b_i."""
         assert self._now is not None, "refresh comes first"
-        return self._now.solve(331, right)
+        return self._now.phase(331, right)
 
     def backward(self, half: np.ndarray, kept: np.ndarray) -> np.ndarray:
         """x (n,) whose kept entries are `kept` (k,), from the result of `forward`."""
         assert self._now is not None, "refresh comes first"
         if self._now.kind == _INDEFINITE:
-            half = self._now.solve(332, half)
+            half = self._now.phase(332, half)
         half = half.copy()
         half[self._kept] = kept
-        return self._now.solve(333, half)
+        return self._now.phase(333, half)
 
 
-class _Phases:
-    """One handle of the library for one kind of matrix; it keeps its ordering and the last factor."""
+class _Phases(_Handle):
+    """Matrices of one pattern, with some unknowns kept last: it keeps its ordering and the last factor."""
 
-    def __init__(self, kind: int, rows: np.ndarray, columns: np.ndarray, kept: np.ndarray) -> None:
-        self.kind, self._rows, self._columns = kind, rows, columns
-        self.size, self._count = len(rows) - 1, len(kept)
-        self._handle, self._iparm = np.zeros(64, dtype=np.int64), np.zeros(64, dtype=np.int32)
-        # values of our own, nested dissection, perturbed pivots, Schur complement with factors, zero-based
-        pivots, schur = 13 if kind == _DEFINITE else 8, 2 if len(kept) else 0
-        for place, value in ((0, 1), (1, 2), (9, pivots), (34, 1), (35, schur)):
-            self._iparm[place] = value
-        self._perm = np.zeros(self.size, dtype=np.int32)
+    def __init__(self, upper: sp.csr_matrix, kept: np.ndarray, kind: int = _DEFINITE) -> None:
+        # perturbed pivots, Schur complement with factors
+        super().__init__(upper, kind, {9: 13 if kind == _DEFINITE else 8, 35: 2 if len(kept) else 0})
+        self._count = len(kept)
         self._perm[kept] = 1
-        self._values = np.ones(len(columns))
-        self._call(11, np.zeros(1), np.zeros(1))
+        self._call(11)
 
     def factorise(self, values: np.ndarray) -> np.ndarray:
         self._values = np.ascontiguousarray(values, dtype=np.float64)
         schur = np.zeros((self._count, self._count))
-        self._call(22, np.zeros(self.size), schur)
+        self._call(22, solution=schur)
         return 0.5 * (schur + schur.T)
-
-    def solve(self, phase: int, right: np.ndarray) -> np.ndarray:
-        """What the library's phase makes of (n,) or (n, r)."""
-        right = np.asfortranarray(right, dtype=np.float64)
-        solution = np.zeros_like(right)
-        self._call(phase, right, solution, 1 if right.ndim == 1 else right.shape[1])
-        return solution
-
-    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int = 1) -> None:
-        error = ctypes.c_int32(0)
-        _mkl().pardiso(
-            _pointer(self._handle), _integer(1), _integer(1), _integer(self.kind), _integer(phase),
-            _integer(self.size), _pointer(self._values), _pointer(self._rows), _pointer(self._columns),
-            _pointer(self._perm), _integer(count), _pointer(self._iparm), _integer(0), _pointer(right),
-            _pointer(solution), ctypes.byref(error),
-        )  # fmt: skip
-        if error.value:
-            raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")
-
-    def __del__(self) -> None:
-        if not sys.is_finalizing() and self._handle.any():
-            self._call(-1, np.zeros(1), np.zeros(1))
