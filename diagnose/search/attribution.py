@@ -21,13 +21,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.fit import settings_of
 from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.own_size import own_n, size_n, without_wider
 from palpate.diagnosis.search.rivals import Choice, Explanation, Names, of_one_phenomenon, posterior
 from palpate.mechanics.effects.base import Effect, Scope
 from palpate.mechanics.progress import Progress, part, silent
-from palpate.render.replay import rms_n
 
 TRIED = 3
 """So many others are tried, those that gain most by themselves."""
@@ -149,7 +148,7 @@ def attribute(
     together = current
     current, chosen = _without_idle(search, chosen, current, seen)
     if not search.forward.measured:
-        current, chosen = _without_wider(search, chosen, current, together)
+        current, chosen = without_wider(search, chosen, current, together)
     if any(n not in seen for n in chosen):
         current, chosen = drop_redundant(search, chosen, current, steps[0], seen)
     for effect in current.found.effects:
@@ -223,7 +222,7 @@ class _Selection:
         """What may be there: it foretells places, and changes enough beside the first."""
         search, first, least = self.search, self.chosen[:1], self._least_n
         able = [s for s in scores.values() if search.able(s, first=not first)]
-        able = [s for s in able if _size_n(search, s, self.chosen, least) > least]
+        able = [s for s in able if size_n(search, s, self.chosen, least) > least]
         if search.forward.measured and search.sideways_off(self.current):
             able = _not_blind_to_slip(search, able)
         return able
@@ -265,31 +264,6 @@ class _Selection:
     def _weigh_strain(self, taken: Score) -> None:
         found = _with_strain(self.search, taken.candidate.found.effects)
         self.current, self.strain_gain, self.strain_closes = found
-
-
-def _size_n(search: Search, score: Score, chosen: Sequence[str], least: float) -> float:
-    """N rms by which a score's effect changes the force. Of a simulator it is the effect's own force in the
-    joint fit, all else as it is there, where what is chosen keeps its place beside it: once that had bent to
-    do the other's work too, the prediction hardly moves."""
-    if search.forward.measured or score.size_n > least:
-        return score.size_n
-    own, effects = _own_n(search, score.candidate, score.effect), score.candidate.found.effects
-    for effect in (e for e in effects if e.name in chosen and own > least):
-        others = search.judge([e for e in effects if e is not effect], like=score.candidate)
-        if search.score([effect], score.candidate, others).probability <= search.options.doubt:
-            return score.size_n  # instead of it, not beside it
-    return own
-
-
-def _own_n(search: Search, candidate: JudgedSet, effect: Effect) -> float:
-    """N rms by which an effect changes the force of a fit, all else as it is there."""
-    found, forward = candidate.found, search.forward
-    without = found.values.copy()
-    without[found.place_of(effect.name)] = effect.ideal
-    both, rest = (
-        forward.predict(settings_of(forward, found.effects, v, found.onset)) for v in (found.values, without)
-    )
-    return rms_n(np.nan_to_num(both - rest)[forward.touches.counted])
 
 
 def _another(score: Score, best: Score) -> bool:
@@ -369,7 +343,7 @@ def _paired(search: Search, able: Sequence[Effect], current: JudgedSet, least_n:
         candidate = search.judge([*current.found.effects, one, two], like=current)
         score = search.score([one, two], candidate, current)
         small = not search.forward.measured and any(
-            _own_n(search, candidate, e) <= least_n for e in score.added
+            own_n(search, candidate, e) <= least_n for e in score.added
         )
         if search.passes(score) and not small:
             found.append(score)
@@ -428,26 +402,6 @@ def _without_idle(
         if score.probability <= search.options.doubt:
             chosen.remove(name)
             current = without
-    return current, chosen
-
-
-def _without_wider(
-    search: Search, chosen: list[str], current: JudgedSet, together: JudgedSet
-) -> tuple[JudgedSet, list[str]]:
-    """What was idle beside a form that can be another's stands instead of that form, where it may be there
-    and the form is not needed beside it: a power of the force has a level of its own, so a plain gain was
-    named a power. together: as chosen before anything was idle."""
-    idle = [e for e in together.found.effects if e not in current.found.effects]
-    for wider, narrow in itertools.product([e for e in current.found.effects if e.hints.any_form], idle):
-        rest = [e for e in current.found.effects if e is not wider]
-        none, alone, both = (
-            search.judge([*rest, *more], like=together) for more in ((), (narrow,), (narrow, wider))
-        )
-        needed = search.passes(search.score([wider], both, alone))
-        if not needed and search.passes(search.score([narrow], alone, none)):
-            search.renew(alone.found)
-            names = [narrow.name if n == wider.name else n for n in chosen]
-            return search.judge(alone.found.effects, like=alone), names
     return current, chosen
 
 
