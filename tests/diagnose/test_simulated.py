@@ -29,7 +29,7 @@ from palpate.diagnosis.other_simulator.gap_decomposition import PARAMETER_OF, St
 from palpate.diagnosis.other_simulator.pipeline import Asked, _Weighed, diagnose_simulated
 from palpate.diagnosis.other_simulator.result import PARTS, GapPart, Mended, parameter_words
 from palpate.diagnosis.pipeline import diagnose
-from palpate.diagnosis.search import attribution
+from palpate.diagnosis.search.own_size import without_wider
 from palpate.diagnosis.verdict.result import EffectEntry
 from palpate.importing.simulated_forces import read_forces
 from palpate.mechanics.contact.dent import FINITE, grid
@@ -493,7 +493,7 @@ def test_a_gain_that_was_idle_beside_a_power_of_the_force_stands_instead_of_it(w
     gain, power = numerical("mesh_stiffness"), numerical("force_law")
     search = searches[0]
     wide, both = search.judge([power]), search.judge([gain, power])
-    left, names = attribution._without_wider(search, ["force_law"], wide, both)
+    left, names = without_wider(search, ["force_law"], wide, both)
     assert names == ["mesh_stiffness"] and left.found.names == ("mesh_stiffness",)
 
 
