@@ -13,6 +13,7 @@ import numpy as np
 
 from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
 from palpate.mechanics.compliance.local_material import patch_softness, punch_factor
+from palpate.mechanics.compliance.pressed_places import Places
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
@@ -44,11 +45,18 @@ def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     places, skin = scene.places, Skin(**_report(values, scene, settings.modulus))
     _set(settings.touch, skin, places.model)
+    local = 1 - patch_softness(energy_fields(places).width_m, skin, places.model.material.poisson_ratio)
+    settings.far = settings.far + _stretched(skin, places) + local * energy_fields(places).half_space
+
+
+def _stretched(skin: Skin, places: Places) -> np.ndarray:
+    """(p, 3, 3) 1/m, change of each press's compliance, unit modulus, as if the skin were stretched like the
+    object that it covers: C (C + (m - 1) E)^-1 C - C, of the energy E that the skin's elements hold of C."""
     fields, thickness = energy_fields(places), skin.thickness_m
     inside = np.clip(thickness / np.maximum(fields.depth, 1e-6), 0, 1) * (fields.depth < 2 * thickness)
-    changed = far_with_weights(places, 1 + inside * (1 / skin.modulus_ratio - 1))
-    local = 1 - patch_softness(fields.width_m, skin, places.model.material.poisson_ratio)
-    settings.far = settings.far + changed - places.far + local * fields.half_space
+    held = far_with_weights(places, 1 + inside) - places.far
+    whole = fields.whole[places.place]
+    return whole @ np.linalg.solve(whole + (skin.modulus_ratio - 1) * held, whole) - whole
 
 
 EFFECT = Effect(
