@@ -20,7 +20,8 @@ from scipy.optimize import minimize
 
 from benchmarks.timing import table
 from palpate.diagnosis.search.naming import FILE, WEIGHTS
-from palpate.mechanics.effects.registry import effects
+from palpate.mechanics.effects.base import Scope
+from palpate.mechanics.effects.registry import effect, effects
 from palpate.mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
 from tools.script import script
@@ -31,7 +32,7 @@ FOUND = 10.0
 """Gain in log likelihood below which a fit has not found an effect."""
 
 
-KEYS = ("offset", "evidence")
+KEYS = ("border", "in_time", "evidence")
 SURE = 4.0
 """Log odds from which a pick counts for the lapse."""
 BORDER = 4.0
@@ -53,11 +54,12 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         )
     x = np.array([row[2] for row in rows])
     there = np.array([row[3] for row in rows])
-    fitted = weights(x, there)
-    used = (WEIGHTS.offset, WEIGHTS.evidence)
+    in_time = np.array([effect(row[1]).scope is Scope.TIME for row in rows])
+    fitted = weights(x, there, in_time)
+    used = (WEIGHTS.border, WEIGHTS.in_time, WEIGHTS.evidence)
     print(table(["", *KEYS], [
         [name, *(f"{v:.2f}" for v in w)] for name, w in (("fitted", fitted), ("in use", used))]))  # fmt: skip
-    odds = x * fitted[1] + fitted[0]
+    odds = fitted[2] * (x - np.log10(np.where(in_time, fitted[1], fitted[0])))
     border = sorted(np.flatnonzero(np.abs(odds) < BORDER), key=lambda i: -odds[i])
     lines = [
         [f"{odds[i]:.1f}", "yes" if there[i] else "no", rows[i][1], f"{x[i]:.2f}"] + [rows[i][0]]
@@ -100,7 +102,7 @@ def sure_picks(opened: dict[str, Any]) -> list[bool]:
     verdict = opened["verdict"]
     picks = [p for p in verdict.get("picked", ())[:1] if p in verdict["scores"]]
     true = {_phenomenon(name) for name in opened["case"]["tested"]}
-    sure = [p for p in picks if WEIGHTS.log_odds(verdict["scores"][p][0]) > SURE]
+    sure = [p for p in picks if WEIGHTS.log_odds(verdict["scores"][p][0], effect(p).scope) > SURE]
     return [_phenomenon(p) not in true for p in sure]
 
 
@@ -110,14 +112,17 @@ def _phenomenon(name: str) -> str:
     return known.get(name) or name
 
 
-def weights(x: np.ndarray, there: np.ndarray, ridge: float = RIDGE) -> np.ndarray:
-    """(2,) offset and weight. x: (n,) log10 evidence; there: (n,) bool."""
+def weights(x: np.ndarray, there: np.ndarray, in_time: np.ndarray, ridge: float = RIDGE) -> np.ndarray:
+    """(3,) border of what acts in space and of what acts in time, nats, and weight. x: (n,) log10 evidence;
+    there, in_time: (n,) bool."""
     sign = np.where(there, 1.0, -1.0)
 
     def loss(w: np.ndarray) -> float:
-        return float(np.logaddexp(0.0, -sign * (w[0] + x * w[1])).sum() + 0.5 * (w[1] / ridge) ** 2)
+        odds = w[2] * (x - np.where(in_time, w[1], w[0]))
+        return float(np.logaddexp(0.0, -sign * odds).sum() + 0.5 * (w[2] / ridge) ** 2)
 
-    return np.asarray(minimize(loss, np.array([-10.0, 8.0])).x)
+    found = minimize(loss, np.array([1.2, 2.0, 8.0])).x
+    return np.array([*10.0 ** found[:2], found[2]])
 
 
 if __name__ == "__main__":

@@ -25,16 +25,19 @@ from palpate.mechanics.law_errors import Unnamed
 
 @dataclass(frozen=True)
 class Weights:
-    """Log odds = offset + evidence * log10(gain in log likelihood). lapse: the share of the surest answers in
-    which something else was there."""
+    """Log odds = evidence * log10(gain in log likelihood over that of the border). border: of what acts in
+    space; in_time: of what has a loop, which the noise of every sample tells, and slow noise imitates. lapse:
+    the share of the surest answers in which something else was there."""
 
-    offset: float
+    border: float
+    in_time: float
     evidence: float
     lapse: float
 
-    def log_odds(self, gain: ArrayLike) -> np.ndarray:
-        """(...) that an effect is there. gain: log likelihood."""
-        return np.asarray(self.offset + self.evidence * np.log10(np.maximum(gain, 1.0)))
+    def log_odds(self, gain: ArrayLike, scope: Scope) -> np.ndarray:
+        """(...) that an effect of a scope is there. gain: log likelihood."""
+        border = self.in_time if scope is Scope.TIME else self.border
+        return np.asarray(self.evidence * np.log10(np.maximum(gain, 1.0) / border))
 
 
 ALL_TOLD = 1e12
@@ -104,7 +107,7 @@ class Score:
     @property
     def log_odds(self) -> float:
         """That it is there, rather than an error of our own law."""
-        return float(WEIGHTS.log_odds(self.evidence))
+        return float(WEIGHTS.log_odds(self.evidence, self.effect.scope))
 
     @property
     def probability(self) -> float:

@@ -8,10 +8,11 @@ from tools.diagnose_weights import rows_of, weights
 
 def test_the_fit_finds_the_border_between_what_is_there_and_what_is_not():
     rng = np.random.default_rng(0)
-    x = rng.uniform(0, 5, 400)
-    there = x + 0.1 * rng.normal(size=400) > 1.5
-    offset, evidence = weights(x, there)
-    assert -offset / evidence == pytest.approx(1.5, abs=0.05) and evidence > 5
+    x = rng.uniform(0, 5, 800)
+    in_time = np.arange(800) % 2 == 1
+    there = x + 0.1 * rng.normal(size=800) > np.where(in_time, 2.5, 1.5)
+    *borders, evidence = weights(x, there, in_time)
+    assert np.log10(borders) == pytest.approx([1.5, 2.5], abs=0.05) and evidence > 5
 
 
 def test_a_case_counts_what_is_false_in_controls_and_what_was_found_in_others():
