@@ -247,6 +247,23 @@ def test_the_table_of_presses_fits_a_phone(shown, tmp_path):
 
 
 @needs_browser
+def test_a_phone_is_told_of_fingers_and_what_is_drawn_takes_one_line(shown, written):
+    """It was told of a wheel and of keys, and the choice of the axis stood in a line of its own."""
+    shown.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+    try:
+        shown.open(written, 390, 844)
+        shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
+        said = shown.evaluate("document.querySelector('.stage').parentElement.innerText")
+    finally:
+        shown.call("Emulation.setTouchEmulationEnabled", enabled=False)
+    assert "two fingers" in said and "tap" in said and "Keys" not in said and "wheel" not in said
+    tops = shown.evaluate(
+        "['what', 'axis'].map(name => document.querySelector('.' + name).getBoundingClientRect().top)"
+    )
+    assert abs(tops[0] - tops[1]) < 1
+
+
+@needs_browser
 def test_a_wall_is_lit_without_a_band(shown, tmp_path):
     """The lamp at the eye ended on it, and left a dark stripe."""
     wall = trimesh.creation.cylinder(RADIUS, 0.06, sections=200)
