@@ -221,19 +221,17 @@ def _draw(plotter: pyvista.Plotter, scene: Scene) -> None:
         (x0, x1, y0, y1, foot, _), blot = surface.bounds, shadow.blot(SHADE)
         blot.points = blot.points * [x1 - x0, y1 - y0, 1.0] + [(x0 + x1) / 2, (y0 + y1) / 2, foot]
         plotter.add_mesh(blot, scalars="shade", rgba=True, opacity=0.6, lighting=False, show_scalar_bar=False)
-        points = np.asarray(surface.points)
-        smooth = lit(points, surface.regular_faces)
-        drawn = pyvista.PolyData.from_regular_faces(points[smooth.at], smooth.triangles)
-        drawn.point_data.active_normals = smooth.normals
-        plotter.add_mesh(drawn, color=COLOURS["object"], smooth_shading=True, **SKIN)
+        plotter.add_mesh(surface, color=COLOURS["object"], smooth_shading=True, **SKIN)
     plotter.camera_position = "xz"
     plotter.camera.elevation = 30.0
 
 
 def _surface_of(scene: Scene) -> pyvista.PolyData | None:
+    """With the normals by which it is lit."""
     if scene.kind == "phantom":
         shape = phantom(scene.source)
-        return pyvista.PolyData.from_regular_faces(shape.vertices, shape.faces)
+        exact = pyvista.PolyData.from_regular_faces(shape.vertices, shape.faces)
+        return exact.compute_normals(cell_normals=False, split_vertices=True)
     kept = kept_surface(scene)
     if kept is None:
         return None
@@ -242,4 +240,8 @@ def _surface_of(scene: Scene) -> pyvista.PolyData | None:
     reader.SetInputString(kept.decode("latin-1"))
     reader.Update()
     read: Any = pyvista.wrap(reader.GetOutput())
-    return read
+    points = np.asarray(read.points)
+    smooth = lit(points, read.regular_faces)
+    drawn = pyvista.PolyData.from_regular_faces(points[smooth.at], smooth.triangles)
+    drawn.point_data.active_normals = smooth.normals
+    return drawn
