@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,12 @@ THINGS = {  # label in a picture -> thing
     "peak": "peak", "tracing the foot": "base-tracing", "sensor's noise": "noise",
     "measured, left out": "measured", "measured, fitted": "measured", "fixed base": "base",
 }  # fmt: skip
+
+CURVES = (
+    "measured", "fem", "fem-homogeneous", "kelvin-voigt", "hunt-crossley", "other-simulator",
+    "simplest", "found",
+)  # fmt: skip
+RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 
 
 def test_each_colour_is_that_of_one_thing():
@@ -54,6 +61,21 @@ def test_a_force_in_its_models_colour_can_be_read():
     for name in (*names(), *simulator_names()):
         assert contrast(colour_of(name), PAPER) >= 4.5, name
     assert min(contrast(GREY, behind) for behind in (PAPER, STAGE)) >= 4.5
+
+
+def _lab(colour: str) -> np.ndarray:
+    """CIE L*a*b*, in which equal steps look about equally large."""
+    shares = np.array(to_rgb(colour))
+    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    x, y, z = np.cbrt(RGB_TO_XYZ @ linear / [0.9505, 1.0, 1.089])
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize("table", [COLOURS, ON_BLACK], ids=["light", "dark"])
+def test_curves_of_one_chart_can_be_told_apart(table):
+    """Another simulator's curve and that of what was found were both green."""
+    for one, other in combinations(CURVES, 2):
+        assert np.linalg.norm(_lab(table[one]) - _lab(table[other])) > 25, (one, other)
 
 
 def test_no_quantity_is_shown_by_black():
