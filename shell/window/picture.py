@@ -128,9 +128,9 @@ class ObjectPicture:
 
     def _colour_by(self, name: str, colours: Any, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
-        opacity, culling = 1.0, "none"
+        opacity = 1.0
         if self._actor is not None:
-            opacity, culling = self._actor.prop.opacity, self._actor.prop.culling
+            opacity = self._actor.prop.opacity
             self._plotter.remove_actor(self._actor, render=False)
             if self._barred:
                 self._plotter.scalar_bars.remove_scalar_bar(self._bar, render=False)
@@ -141,6 +141,7 @@ class ObjectPicture:
             cmap=colours,
             clim=limits,
             opacity=opacity,
+            culling="back",  # the foot, where it is seen edge on, would sparkle; seen through, it would shine
             **SKIN,
             show_scalar_bar=self._barred,
             scalar_bar_args={
@@ -157,7 +158,7 @@ class ObjectPicture:
         )
         for words in self._bar_letters():
             set_type(words, round(BAR * self._scale), False, INK)
-        self._actor.prop.interpolation, self._actor.prop.culling = "Gouraud", culling
+        self._actor.prop.interpolation = "Gouraud"
 
     def scale(self, scale: float) -> None:
         """The bar's letters as large as the window is, against one of full size."""
@@ -181,8 +182,6 @@ class ObjectPicture:
     def _see_through(self, on: bool) -> None:
         if self._actor is not None:
             self._actor.prop.opacity = 0.45 if on else 1.0
-            # what is seen through is its front alone, whatever the order of its triangles
-            self._actor.prop.culling = "back" if on else "none"
 
     def show_inclusion(self, region: Region | None) -> None:
         """A ball where the inclusion is, seen through the object, or nothing."""
