@@ -5,11 +5,11 @@ from __future__ import annotations
 COLOURS = {
     # forces, and the models that they are of
     "measured": "#1d3557",
-    "fem": "#e0662f",
+    "fem": "#c8501d",
     "fem-homogeneous": "#f2a884",
     "kelvin-voigt": "#7b4fc9",
-    "hunt-crossley": "#2f7fd6",
-    "other-simulator": "#2e8b57",
+    "hunt-crossley": "#2872c8",
+    "other-simulator": "#a8198f",
     "simplest": "#8c5a3c",
     "found": "#1f8a7c",
     "not-ruled-out": "#d9a021",
@@ -56,18 +56,18 @@ COLOURS = {
 ON_BLACK = {
     "measured": "#a9c7ee",
     "fem": "#ff9461",
-    "fem-homogeneous": "#c98a6b",
+    "fem-homogeneous": "#ae6544",
     "kelvin-voigt": "#b79cf0",
-    "hunt-crossley": "#6db0f7",
-    "other-simulator": "#5fc48a",
-    "simplest": "#c99a7c",
+    "hunt-crossley": "#4f9bf0",
+    "other-simulator": "#f07ad6",
+    "simplest": "#b3a04a",
     "found": "#4fd0be",
     "object": "#cdb99f",
     "touch": "#ff5964",
     "tip": "#aab6c4",
 }
 """The same where a page is dark: lighter, of the same hue."""
-UNNAMED = ("#8e5bd0", "#c2571a", "#0f8b8d", "#b5179e", "#6f9f52", "#3a86ff", "#bc6c25", "#7b8794")
+UNNAMED = ("#8e5bd0", "#8f7400", "#0f8b8d", "#3d8b57", "#6f9f52", "#3a86ff", "#bc6c25", "#7b8794")
 """Of curves that are compared once and have no name in the table, in order."""
 
 

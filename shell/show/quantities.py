@@ -39,7 +39,7 @@ class ShownQuantity:
 
 ORDER = ShownQuantity("first touches, in order", "", 1.0, "plasma")
 DEPTH = ShownQuantity("greatest depth", "mm", 1e3, "YlGnBu")
-ERROR = ShownQuantity("force error", "mN", 1e3, "magma_r")
+ERROR = ShownQuantity("force error", "mN", 1e3, "YlOrRd")
 STIFFNESS = ShownQuantity("own stiffness", "N/m", 1.0, "viridis")
 KELVIN_VOIGT = ShownQuantity("stiffness k_V of a press", "N/m", 1.0, "viridis")
 MODULUS = ShownQuantity("modulus", "kPa", 1e-3, "cividis", least_share=0.5)

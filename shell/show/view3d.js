@@ -48,11 +48,11 @@ function start(root) {
   stage.prepend(renderer.domElement);
   renderer.domElement.setAttribute("aria-hidden", "true");
   const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(FIELD_DEG, 1, 1, 1e5);
-  const sky = new THREE.HemisphereLight(0xffffff, 0x8a8f98, 0.62), sun = new THREE.DirectionalLight(0xffffff, 0.5);
-  scene.add(sky, camera);
-  camera.add(sun);
-  sun.position.set(-0.5, 0.9, 0.6);
-  sun.target = camera;
+  // brightness goes evenly with the normal, all around: a lamp ends where a surface turns away, and leaves a band there
+  const sky = new THREE.HemisphereLight(0xffffff, 0x7d7d80, 1.05);
+  sky.position.set(-0.4, 0.75, 0.53).multiplyScalar(1e9);  // far off, over the eye's shoulder
+  camera.add(sky);
+  scene.add(camera);
 
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
@@ -229,7 +229,7 @@ function start(root) {
     part("press-name").textContent = `Press ${k + 1}`;
     part("numbers").textContent = data.table.head.slice(1).map((name, i) => {
       const [, what, unit] = name.match(/^(.*?)(?: \[(.*)\])?$/);
-      return `${what.replace("at x, y, z", "at")} ${row[i + 1]}${unit ? " " + unit : ""}`;
+      return `${what.replace("at x, y, z", "at")} ${row[i + 1]}${unit ? "\u00a0" + unit : ""}`;
     }).join("; ");
     part("numbers").setAttribute("aria-live", told ? "polite" : "off");
     for (const other of root.querySelectorAll("tr[aria-selected]")) other.removeAttribute("aria-selected");

@@ -72,10 +72,9 @@ class AxesGizmo:
         mapper.SetTransformCoordinate(place)
         mapper.SetInputData(self._lines)
         mapper.SetScalarModeToUseCellData()
-        actor = vtkActor2D()
-        actor.SetMapper(mapper)
-        actor.GetProperty().SetLineWidth(2.0)
-        renderer.AddViewProp(actor)
+        self._actor = vtkActor2D()
+        self._actor.SetMapper(mapper)
+        renderer.AddViewProp(self._actor)
         self.letters = [vtkTextActor() for _ in AXES]
         for letter, (name, colour) in zip(self.letters, AXES.items(), strict=True):
             letter.SetInput(name)
@@ -94,6 +93,7 @@ class AxesGizmo:
         points = np.zeros((6, 3))
         points[::2, :2], points[1::2, :2] = middle, middle + LENGTH * scale * seen
         self._lines.points = points
+        self._actor.GetProperty().SetLineWidth(2.0 * scale)
         places = middle + (LENGTH + 9.0) * scale * seen
         kept: list[np.ndarray] = []
         for k in np.argsort(-np.linalg.norm(seen, axis=1)):

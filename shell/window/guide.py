@@ -22,7 +22,7 @@ from palpate.mechanics.model.model import Model
 from palpate.servo import Servo
 from palpate.show.colours import COLOURS
 from palpate.window.base_tracing import BaseTracing
-from palpate.window.picture import arrow_matrix
+from palpate.window.picture import SKIN, arrow_matrix
 from palpate.window.worker import Worker
 from palpate.words import kpa, mm
 
@@ -47,9 +47,9 @@ class GhostTip:
     def __init__(self, plotter: pyvista.Plotter, tip_radius_m: float) -> None:
         plotter.subplot(0, 0)
         ball = pyvista.Sphere(radius=tip_radius_m, theta_resolution=20, phi_resolution=20)
-        self._tips = [plotter.add_mesh(ball.copy(), color=COLOUR, opacity=o) for o in (0.55, 0.25)]
+        self._tips = [plotter.add_mesh(ball.copy(), color=COLOUR, opacity=o, **SKIN) for o in (0.55, 0.25)]
         staff = pyvista.Arrow(start=(-1, 0, 0), tip_length=0.25, tip_radius=0.09, shaft_radius=0.03)
-        self._staff = plotter.add_mesh(staff, color=COLOUR, opacity=0.7)
+        self._staff = plotter.add_mesh(staff, color=COLOUR, opacity=0.7, **SKIN)
         self._radius = tip_radius_m
         self.show(None)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from palpate.render.registry import names
-from palpate.show.colours import ACCENT, GREY, HINT, WARNING, colour_of
+from palpate.show.colours import GREY, HINT, WARNING, colour_of
 from palpate.window.guide import ON_IT
 from palpate.window.keys import KEYS, help_rows, shown
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
@@ -93,7 +93,7 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
     rows.append((Item(second, size=15, bold=True, colour=colour, tip=called),))
     rows += [
         (Item(_where(window, frame), size=12, colour=GREY, tip=HERE),),
-        (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=6 if window.game else 2),),
+        (Item(window.next_words(frame), fill=HINT, least_lines=6 if window.game else 2),),
     ]
     if window.moved_by_mouse:
         rows += depth_rows(window)
@@ -248,8 +248,6 @@ def settings_rows(window: TouchWindow) -> list[Row]:
             *_title(f"Effects: {', '.join(map(spaced, sorted(session.model.effects)))}"),
             tuple(_choices(session.effects, on_off, session.set_effects)),
         ]
-    if window.moved_by_mouse:
-        rows += [*_title("Depth"), *depth_rows(window)]
     return rows
 
 

@@ -30,9 +30,9 @@ DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 BAR = 11
 """Size of the colour bar's type, in a window of full size."""
 
-LIGHTS = (((-0.4, 0.55, 1.0), 0.9), ((0.9, -0.1, 0.6), 0.45))
-"""Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
-SKIN: dict[str, Any] = {"ambient": 0.5, "diffuse": 0.5}
+LIGHT = np.array([-0.4, 0.75, 0.53])
+"""Where light comes from, beside, over and before the eye, with which it turns."""
+SKIN: dict[str, Any] = {"ambient": 0.8, "diffuse": 0.26}
 """How the object takes light: as matt, and its sides as light, as on a page that is pressed."""
 
 FAR = [COLOURS["object"], COLOURS["fem"], COLOURS["displaced"]]
@@ -40,9 +40,14 @@ FAR = [COLOURS["object"], COLOURS["fem"], COLOURS["displaced"]]
 
 
 def add_lights(plotter: pyvista.Plotter) -> None:
-    """Light the active subplot, which has no light of its own, as all objects are lit."""
-    for place, strength in LIGHTS:
-        light = pyvista.Light(position=place, light_type="camera light", intensity=strength)
+    """Light the active subplot, which has no light of its own, as all objects are lit.
+
+    A light ends where a surface turns away from it, and the eye sees a band there. So its opposite takes away
+    as much on the far side: brightness goes evenly with the normal, all around."""
+    for strength in (1.0, -1.0):
+        light = pyvista.Light(position=strength * LIGHT, light_type="camera light", intensity=strength)
+        if strength < 0:
+            light.specular_color = "black"
         plotter.add_light(light, only_active=True)
 
 
@@ -57,7 +62,6 @@ class ObjectPicture:
         tip_radius_m: float,
         *,
         place: tuple[int, int] = (0, 0),
-        label: str = "",
     ) -> None:
         self._plotter = plotter
         self._radius = tip_radius_m
@@ -71,24 +75,27 @@ class ObjectPicture:
         self._longest_m = LONGEST_ARROW * float(np.linalg.norm(np.ptp(felt.vertices, axis=0)))
         self._place_surface()
         self._actor: pyvista.Actor | None = None
+        self._barred = place == (0, 0)  # another picture beside it has the same colours
         self._bar, self._scale = "", 1.0
-        self._title = label
         _add_support(plotter, model, self._rest)
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
             smooth_shading=True,
             color=COLOURS["tip"],
-            ambient=0.35,
+            ambient=0.75,
+            diffuse=0.5,
             specular=0.4,
         )
         self._arrow = plotter.add_mesh(
             pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08),
-            ambient=0.6,
+            ambient=0.95,
+            diffuse=0.2,
         )
         self._ball = plotter.add_mesh(
             pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20),
             smooth_shading=True,
             color=COLOURS["inclusion"],
+            **SKIN,
         )
         self._ball.SetVisibility(False)
         self._inside: Region | None = None
@@ -121,21 +128,24 @@ class ObjectPicture:
 
     def _colour_by(self, name: str, colours: Any, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
-        opacity, culling = 1.0, "none"
+        opacity = 1.0
         if self._actor is not None:
-            opacity, culling = self._actor.prop.opacity, self._actor.prop.culling
+            opacity = self._actor.prop.opacity
             self._plotter.remove_actor(self._actor, render=False)
-            self._plotter.scalar_bars.remove_scalar_bar(self._bar, render=False)
-        self._bar = f"{name}{self._title}"
+            if self._barred:
+                self._plotter.scalar_bars.remove_scalar_bar(self._bar, render=False)
+        self._bar = name
         self._actor = self._plotter.add_mesh(
             self._surface,
             scalars=name,
             cmap=colours,
             clim=limits,
             opacity=opacity,
+            culling="back",  # the foot, where it is seen edge on, would sparkle; seen through, it would shine
             **SKIN,
+            show_scalar_bar=self._barred,
             scalar_bar_args={
-                "title": self._bar,
+                "title": name,
                 "n_labels": 2,  # a third would lie under the title
                 "fmt": "%.0f",
                 "width": 0.42,
@@ -146,17 +156,21 @@ class ObjectPicture:
             },
             render=False,
         )
-        bar = self._plotter.scalar_bars[self._bar]
-        for words in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
+        for words in self._bar_letters():
             set_type(words, round(BAR * self._scale), False, INK)
-        self._actor.prop.interpolation, self._actor.prop.culling = "Gouraud", culling
+        self._actor.prop.interpolation = "Gouraud"
 
     def scale(self, scale: float) -> None:
         """The bar's letters as large as the window is, against one of full size."""
         self._scale = scale
-        bar = self._plotter.scalar_bars[self._bar]
-        for words in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
+        for words in self._bar_letters():
             words.SetFontSize(round(BAR * scale))
+
+    def _bar_letters(self) -> list[Any]:
+        if not self._barred:
+            return []
+        bar = self._plotter.scalar_bars[self._bar]
+        return [bar.GetTitleTextProperty(), bar.GetLabelTextProperty()]
 
     def _place_surface(self) -> None:
         """Where it has moved to, and lit as it has turned."""
@@ -168,8 +182,6 @@ class ObjectPicture:
     def _see_through(self, on: bool) -> None:
         if self._actor is not None:
             self._actor.prop.opacity = 0.45 if on else 1.0
-            # what is seen through is its front alone, whatever the order of its triangles
-            self._actor.prop.culling = "back" if on else "none"
 
     def show_inclusion(self, region: Region | None) -> None:
         """A ball where the inclusion is, seen through the object, or nothing."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pyvista
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from palpate.mechanics.frames import tangents
@@ -14,7 +15,7 @@ from palpate.show.colours import COLOURS
 
 FLOOR_COLOUR = np.array(pyvista.Color(COLOURS["support"]).int_rgb, dtype=float)
 DARKEST, UNDER = 0.5, 0.97
-_DIRECTIONS, _ANGLES, _NEAR_RINGS, _FAR_RINGS = 96, 72, 28, 12
+_DIRECTIONS, _ANGLES, _NEAR_RINGS, _FAR_RINGS, _SMOOTH = 96, 72, 28, 12, 2.0
 
 
 def floor(middle: np.ndarray, up: np.ndarray, radius_m: float, points: np.ndarray) -> pyvista.PolyData:
@@ -30,8 +31,10 @@ def floor(middle: np.ndarray, up: np.ndarray, radius_m: float, points: np.ndarra
     taken = occlusion(disc.points, points, up)
     open_ = np.flatnonzero(taken < UNDER)
     # as dark under the object as beside it: a triangle that lies half under it would show as a tooth
-    taken = taken[open_[cKDTree(disc.points[open_]).query(disc.points)[1]]]
-    shade = 1.0 - DARKEST * taken
+    beside = open_[cKDTree(disc.points[open_]).query(disc.points)[1]]
+    # the directions are few: along each ring, the clouds that they leave are smoothed
+    even = gaussian_filter1d(taken[beside].reshape(-1, _ANGLES), _SMOOTH, axis=1, mode="wrap").ravel()
+    shade = 1.0 - DARKEST * even[beside]
     disc.point_data["shade"] = (shade[:, None] * FLOOR_COLOUR).astype(np.uint8)
     return disc
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
+import numpy as np
 import pyvista
 from vtkmodules.vtkInteractionStyle import vtkInteractorStyleUser
 from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
@@ -20,6 +21,8 @@ from palpate.scenes.kept import kept_surface
 from palpate.scenes.phantoms import phantom
 from palpate.scenes.scene import Scene
 from palpate.show.colours import COLOURS, GREY, HINT, PAPER, STAGE
+from palpate.show.light import lit
+from palpate.window import shadow
 from palpate.window.picture import SKIN, add_lights
 from palpate.window.widgets import SIZE, Board, Item, fit_screen
 
@@ -28,6 +31,8 @@ PERIOD_S = 0.05
 COLUMNS = 3
 SPACE, HEAD, PICTURE = 16, 76, 250
 """Between cards, above them, and the height of a card's picture, pixels of a window of full size."""
+SHADE = 0.7
+"""How far the shadow at an object's foot reaches from its middle, in widths of the object."""
 EVERY = 15
 """Of a recording's samples one in so many is drawn."""
 
@@ -74,6 +79,7 @@ class WaitingWindow:
             lighting="none",
             title="Palpate",
         )
+        self.plotter.enable_anti_aliasing("msaa")
         fit_screen(self.plotter)
         base, *self._views = self.plotter.renderers
         base.set_background(STAGE)
@@ -84,6 +90,7 @@ class WaitingWindow:
             self.plotter.subplot(0, 1 + place)
             _draw(self.plotter, scene)
             view.set_background(PAPER)
+            view.UseOITOff()  # else edges beside a shadow are not smooth
         self._lay_out()
         iren = self.plotter.iren
         assert iren is not None, "pyvista makes an interactor with its plotter"
@@ -118,7 +125,7 @@ class WaitingWindow:
             x0, x1 = (left + inset) / width, (left + wide - inset) / width
             view.viewport = (x0, low / height, x1, (top - inset) / height)
             view.reset_camera()
-            view.camera.zoom(1.2)
+            view.camera.zoom(1.3)
         self._hover()
 
     def _hover(self) -> None:
@@ -211,16 +218,20 @@ def _draw(plotter: pyvista.Plotter, scene: Scene) -> None:
         plotter.add_points(path, color=COLOURS["object"], point_size=2.0)
     else:
         add_lights(plotter)
-        look: dict[str, Any] = {"smooth_shading": True, "split_sharp_edges": True, **SKIN}
-        plotter.add_mesh(surface, color=COLOURS["object"], **look)
+        (x0, x1, y0, y1, foot, _), blot = surface.bounds, shadow.blot(SHADE)
+        blot.points = blot.points * [x1 - x0, y1 - y0, 1.0] + [(x0 + x1) / 2, (y0 + y1) / 2, foot]
+        plotter.add_mesh(blot, scalars="shade", rgba=True, opacity=0.6, lighting=False, show_scalar_bar=False)
+        plotter.add_mesh(surface, color=COLOURS["object"], smooth_shading=True, **SKIN)
     plotter.camera_position = "xz"
     plotter.camera.elevation = 30.0
 
 
 def _surface_of(scene: Scene) -> pyvista.PolyData | None:
+    """With the normals by which it is lit."""
     if scene.kind == "phantom":
         shape = phantom(scene.source)
-        return pyvista.PolyData.from_regular_faces(shape.vertices, shape.faces)
+        exact = pyvista.PolyData.from_regular_faces(shape.vertices, shape.faces)
+        return exact.compute_normals(cell_normals=False, split_vertices=True)
     kept = kept_surface(scene)
     if kept is None:
         return None
@@ -229,4 +240,8 @@ def _surface_of(scene: Scene) -> pyvista.PolyData | None:
     reader.SetInputString(kept.decode("latin-1"))
     reader.Update()
     read: Any = pyvista.wrap(reader.GetOutput())
-    return read
+    points = np.asarray(read.points)
+    smooth = lit(points, read.regular_faces)
+    drawn = pyvista.PolyData.from_regular_faces(points[smooth.at], smooth.triangles)
+    drawn.point_data.active_normals = smooth.normals
+    return drawn

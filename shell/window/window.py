@@ -39,6 +39,8 @@ from palpate.words import begun, renderer_words, sentence
 PERIOD_MS = 16
 COLUMN, CHARTS = 280, 190
 """Width of the columns beside the pictures and height of the plots, pixels of a window of full size."""
+BY_SOFTWARE, SAMPLES = ("llvmpipe", "softpipe", "SwiftShader", "GDI Generic", "Basic Render"), 4
+"""What OpenGL calls itself where no graphics card draws; of each pixel of an edge where one does."""
 LEAST_SCALE, MOST_SCALE = 0.55, 2.5
 
 
@@ -115,7 +117,6 @@ class TouchWindow:
             renderer.set_background(STAGE)
             # blending in any order takes several passes over the whole picture; a shadow needs one
             renderer.UseOITOff()
-        # smoothing edges costs more than all the rest where there is no graphics card
         window = plotter.render_window
         assert window is not None, "a plotter has one until it is closed"
         window.SetMultiSamples(0)
@@ -141,9 +142,7 @@ class TouchWindow:
         add_lights(self.plotter)
         session = self.session
         drawing, radius = session.drawing(name), session.servo.tip_radius_m
-        return ObjectPicture(
-            self.plotter, drawing, session.model, radius, place=(0, side), label=" " if side else ""
-        )
+        return ObjectPicture(self.plotter, drawing, session.model, radius, place=(0, side))
 
     def _look(self) -> Orbit:
         """From the person's side, a little above; both pictures share the camera."""
@@ -324,6 +323,7 @@ class TouchWindow:
         self._end_s = time.perf_counter() + seconds if seconds else float("inf")
         interactor = self.controls.interactor
         self.plotter.show(interactive_update=True, auto_close=False)
+        self.smooth_edges()
         shown()
         interactor.AddObserver("TimerEvent", lambda *_: self._timed(screenshot))
         interactor.CreateRepeatingTimer(PERIOD_MS)
@@ -331,6 +331,12 @@ class TouchWindow:
         with loaded_whole(self.close):
             interactor.Start()
             self.plotter.close()
+
+    def smooth_edges(self) -> None:
+        """Of a shown window that a graphics card draws: without one that costs more than all the rest."""
+        window = self.plotter.render_window
+        if window is not None and not any(name in window.ReportCapabilities() for name in BY_SOFTWARE):
+            window.SetMultiSamples(SAMPLES)
 
     def _timed(self, screenshot: Path | None) -> None:
         if self._ended:

@@ -26,7 +26,7 @@ void main() {
   vec3 n = normalize(out_), view = normalize(eye - at);
   vec3 skin = colour;
   if (coloured > 0.5) skin = shade < 0.5 ? mix(low, middle, shade * 2.0) : mix(middle, high, shade * 2.0 - 1.0);
-  float lit = clamp((dot(n, light) + 0.25) / 1.25, 0.0, 1.0);
+  float lit = max(0.35 + 0.6 * dot(n, light), 0.0);
   float sky = 0.5 + 0.5 * dot(n, up);
   float shine = pow(max(dot(n, normalize(light + view)), 0.0), 28.0) * 0.10;
   float rim = pow(1.0 - max(dot(n, view), 0.0), 3.0) * 0.10;

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from matplotlib import colormaps
+from matplotlib.colors import to_hex, to_rgb
 
+from palpate.render.registry import names, simulator_names
+from palpate.show import quantities, story_of
 from palpate.show import story as say
-from palpate.show import story_of
-from palpate.show.colours import COLOURS, ON_BLACK, UNNAMED, colour_of, style_sheet
+from palpate.show.colours import COLOURS, GREY, ON_BLACK, PAPER, STAGE, UNNAMED, colour_of, style_sheet
 from palpate.words import MOST_WORDS, headline
 
 SHELL = Path(__file__).resolve().parents[3] / "shell"
@@ -24,12 +27,62 @@ THINGS = {  # label in a picture -> thing
     "measured, left out": "measured", "measured, fitted": "measured", "fixed base": "base",
 }  # fmt: skip
 
+CURVES = (
+    "measured", "fem", "fem-homogeneous", "kelvin-voigt", "hunt-crossley", "other-simulator",
+    "simplest", "found",
+)  # fmt: skip
+RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+
 
 def test_each_colour_is_that_of_one_thing():
     every = [*COLOURS.values(), *UNNAMED]
     assert len(set(every)) == len(every) and ON_BLACK.keys() <= COLOURS.keys()
     assert colour_of("hunt-crossley-kh") == COLOURS["hunt-crossley"]
     assert colour_of("mujoco") == COLOURS["other-simulator"] and colour_of("fem") == COLOURS["fem"]
+
+
+def _luminance(colour: str) -> float:
+    """Relative, by WCAG 2."""
+    shares = np.array(to_rgb(colour))
+    return float(
+        [0.2126, 0.7152, 0.0722]
+        @ np.where(shares <= 0.03928, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    )
+
+
+def contrast(colour: str, behind: str) -> float:
+    """Ratio of a word to what stands behind it, by WCAG 2: 4.5 is what small words need."""
+    low, high = sorted((_luminance(colour), _luminance(behind)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_a_force_in_its_models_colour_can_be_read():
+    """Hunt-Crossley's blue stood out by 4.1 to 1 from the column that it was written on."""
+    for name in (*names(), *simulator_names()):
+        assert contrast(colour_of(name), PAPER) >= 4.5, name
+    assert min(contrast(GREY, behind) for behind in (PAPER, STAGE)) >= 4.5
+
+
+def _lab(colour: str) -> np.ndarray:
+    """CIE L*a*b*, in which equal steps look about equally large."""
+    shares = np.array(to_rgb(colour))
+    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    x, y, z = np.cbrt(RGB_TO_XYZ @ linear / [0.9505, 1.0, 1.089])
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize("table", [COLOURS, ON_BLACK], ids=["light", "dark"])
+def test_curves_of_one_chart_can_be_told_apart(table):
+    """Another simulator's curve and that of what was found were both green."""
+    for one, other in combinations(CURVES, 2):
+        assert np.linalg.norm(_lab(table[one]) - _lab(table[other])) > 25, (one, other)
+
+
+def test_no_quantity_is_shown_by_black():
+    """Where the error was greatest an object was black: neither its shape nor a dot was to be seen there."""
+    for shown in (q for q in vars(quantities).values() if isinstance(q, quantities.ShownQuantity)):
+        darkest = min(_luminance(to_hex(c)) for c in colormaps[shown.colour_map](np.linspace(0.0, 1.0, 32)))
+        assert darkest > 0.01, shown.name
 
 
 def test_nothing_but_the_table_names_a_colour():

@@ -231,6 +231,52 @@ def test_it_fits_a_phone_and_the_dark(tab, written, width, dark):
 
 
 @needs_browser
+def test_the_table_of_presses_fits_a_phone(shown, tmp_path):
+    """Its last column was cut off, and a place took three lines."""
+    view, page = a_view(), Page("A ball")
+    of = [view.colourings[k] for k in (0, 1, 3, 5)]
+    page.view(View(view.thing, view.places, of, view.traces), Figure(figsize=(3, 2)), "The picture.")
+    shown.open(page.write(tmp_path / "table.html"), 390, 844)
+    shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
+    shown.evaluate("document.querySelector('details.presses').open = true")
+    assert shown.evaluate("(e => e.scrollWidth <= e.clientWidth)(document.querySelector('.presses .scroll'))")
+    high = shown.evaluate("document.querySelector('.presses tbody tr').getBoundingClientRect().height")
+    assert high < 40, "a line a press"
+    said = shown.evaluate("document.querySelector('.numbers').textContent")
+    assert not re.search(r"\d (mm|mN|kPa)", said), "a number and its unit stay in one line"
+
+
+@needs_browser
+def test_a_phone_is_told_of_fingers_and_what_is_drawn_takes_one_line(shown, written):
+    """It was told of a wheel and of keys, and the choice of the axis stood in a line of its own."""
+    shown.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+    try:
+        shown.open(written, 390, 844)
+        shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
+        said = shown.evaluate("document.querySelector('.stage').parentElement.innerText")
+    finally:
+        shown.call("Emulation.setTouchEmulationEnabled", enabled=False)
+    assert "two fingers" in said and "tap" in said and "Keys" not in said and "wheel" not in said
+    tops = shown.evaluate(
+        "['what', 'axis'].map(name => document.querySelector('.' + name).getBoundingClientRect().top)"
+    )
+    assert abs(tops[0] - tops[1]) < 1
+
+
+@needs_browser
+def test_a_wall_is_lit_without_a_band(shown, tmp_path):
+    """The lamp at the eye ended on it, and left a dark stripe."""
+    wall = trimesh.creation.cylinder(RADIUS, 0.06, sections=200)
+    object_drawn(shown, tmp_path, wall, 0.5)
+    left, top, width, height = stage(shown)
+    row = pixels(shown, left, top + 0.6 * height, width, 1)[0].astype(float)
+    light = row[row[:, 0] - row[:, 2] > 15].mean(axis=1)[8:-8]  # the floor is grey
+    fall = np.diff(np.convolve(light, np.ones(15) / 15, "valid"))
+    assert len(light) > 100 and fall.max() < 0.0, "darker from left to right, all the way"
+    assert (fall - np.minimum.accumulate(fall)).max() < 0.15, "ever faster, as a wall turns away"
+
+
+@needs_browser
 def test_a_screen_of_4k_is_used_and_read_from_as_far(tab, written):
     tab.open(written, 3840, 2160)
     tab.wait("document.querySelector('section.view3d').dataset.state === 'live'")

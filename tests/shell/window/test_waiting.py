@@ -102,8 +102,22 @@ def test_the_first_card_is_a_picture_of_what_one_will_touch(own_cache: Path) -> 
     """It was a cloud of where the tip went."""
     plotter = pyvista.Plotter(off_screen=True)
     _draw(plotter, load_scene(DEFAULT))
-    (actor,) = plotter.actors.values()
-    drawn = actor.mapper.dataset
+    shade, drawn = (actor.mapper.dataset for actor in plotter.actors.values())
     size = np.ptp(drawn.points, axis=0)
     assert drawn.n_cells > 100 and size == pytest.approx([0.08, 0.08, 0.08], rel=0.1)
+    assert shade.points[:, 2] == pytest.approx(drawn.points[:, 2].min()), "it stands on its shadow"
     plotter.close()
+
+
+def test_a_round_wall_is_lit_without_a_band() -> None:
+    """Each of two lights ended somewhere on it, and the eye saw a stripe there; the top was as dim."""
+    plotter = pyvista.Plotter(off_screen=True, window_size=[300, 300], lighting="none")
+    _draw(plotter, load_scene("silicone-1"))
+    plotter.camera.zoom(1.3)
+    light = np.asarray(plotter.screenshot(return_img=True)).sum(axis=2, dtype=float)
+    plotter.close()
+    wall = light[150][light[150] < light[0, 0]][5:-5]
+    fall = np.diff(np.convolve(wall, np.ones(9) / 9, "valid"))
+    assert len(wall) > 150 and fall.max() < 0.0, "darker from left to right, all the way"
+    assert fall.min() > 2.0 * fall.mean(), "evenly"
+    assert light[75, 150] > wall.max() + 30, "light comes from above"

@@ -21,7 +21,7 @@ from palpate.mechanics.recording.recording import read_recording
 from palpate.operations.touch import ServoRun
 from palpate.scenes.phantoms import Region
 from palpate.scenes.scene import Scene, load_scene
-from palpate.show.colours import COLOURS
+from palpate.show.colours import ACCENT, BUTTON, COLOURS, PAPER
 from palpate.window.charts import LEAST_MM, LEAST_N, ROOM, LiveCharts
 from palpate.window.game import Game
 from palpate.window.keys import KEYS
@@ -32,6 +32,7 @@ from palpate.window.widgets import SIZE as FULL
 from palpate.window.window import COLUMN, TouchWindow
 
 from ...support.waiting import PATIENCE_S, eventually
+from ..show.test_colours import contrast
 from .driven import HALF, Driven, driving
 
 SIZE = (640, 480)
@@ -476,6 +477,37 @@ def test_the_force_is_large_and_the_next_step_is_said(driven: Driven) -> None:
     driven.says(f"{sizes(press(driven))[0]:.2f} N")
     assert max(item.size for item, _ in column.placed if item.text.endswith(" N")) > 3 * BODY
     release(driven)
+
+
+def test_every_word_stands_out_from_what_is_behind_it(driven: Driven) -> None:
+    """The hint was green on green, 4.4 to 1."""
+    driven.window.show_aside("s")
+    driven.says("Close")
+    for board in driven.window.boards:
+        for item, _ in board.placed:
+            behind = item.fill or (BUTTON if item.do else board.fill)
+            colours = (PAPER, ACCENT) if item.on else (item.colour, behind)
+            assert not item.text or contrast(*colours) >= 4.5, item.text
+    told = " ".join(board.text for board in driven.window.boards)
+    assert told.count("A press goes") == 1, "once is enough"
+    driven.window.show_aside("s")
+    driven.says("Close", says=False)
+
+
+def test_pictures_of_one_scale_have_one_bar(driven: Driven) -> None:
+    driven.frame()
+    assert driven.window.sides == 2 and len(driven.window.plotter.scalar_bars) == 1
+
+
+@pytest.mark.parametrize(("by", "samples"), [("llvmpipe (LLVM 15)", 0), ("NVIDIA GeForce RTX 3060", 4)])
+def test_a_graphics_card_smooths_edges(driven: Driven, by: str, samples: int) -> None:
+    """They were stairs on every machine."""
+    window = driven.window.plotter.render_window
+    card = SimpleNamespace(ReportCapabilities=lambda: by, SetMultiSamples=window.SetMultiSamples)
+    seen = SimpleNamespace(plotter=SimpleNamespace(render_window=card))
+    TouchWindow.smooth_edges(seen)
+    assert window.GetMultiSamples() == samples
+    window.SetMultiSamples(0)
 
 
 def test_an_empty_plot_shows_newtons_and_millimetres() -> None:
