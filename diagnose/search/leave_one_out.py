@@ -17,6 +17,9 @@ DAMPINGS = (1e-9, 1e-3, 1e-2, 0.1, 1.0)
 """Of a step, as shares of the curvature, the least first: where two branches of one time are thrown by the
 linear answer is no place that the other groups would choose."""
 
+STATED = 10.0
+"""As many places stand for the stated widths of our own errors."""
+
 
 @dataclass(frozen=True)
 class JudgedSet:
@@ -33,8 +36,11 @@ class JudgedSet:
 
     @property
     def over(self) -> float:
-        """What gains by what differs from place to place are divided by: the set's own lack of fit."""
-        return max(1.0, self.chi, self.place_chi)
+        """What gains by what differs from place to place are divided by: the set's own lack of fit. Where the
+        places scatter less than our own errors are said to be, these are as small as so many places tell."""
+        places = len(self.held)
+        told = (STATED + places * self.place_chi) / (STATED + places)
+        return max(told, self.place_chi, self.chi if self.chi > 1 else 0.0)
 
     @property
     def residual(self) -> np.ndarray:
