@@ -35,6 +35,9 @@ DEPTHS_M = (0.001, 0.003, 0.006)
 _UP = np.array([0.0, 0.0, 1.0])
 FINENESS = Fineness(2.0, 6.0, 0.5)
 """Of the laboratory's mesh."""
+_LONGEST_M = 2.5e-4
+"""Of the laboratory's load steps: a sticking tip is held aside by what it meets in a longer one, and pushed
+back less. Steps of 0.1 mm give 0.04 % more at 3 mm, steps of 1 mm 0.2 % less (dome, apex)."""
 
 
 class Given(Protocol):
@@ -114,11 +117,15 @@ def in_laboratory(
     specimen = Specimen(poisson_ratio, radius, finite=True, friction=friction)
     problem = build(thing, specimen, at, travel=0.0, fineness=fineness)
     state = problem.rest(at + radius * normal)
+    before = 0.0
     for k, depth in enumerate(depths_m):
+        steps = int(np.ceil((depth - before) / _LONGEST_M - 1e-9))
         try:
-            state = problem.advance(state, at + (radius - 1e3 * depth) * normal)
+            for down in np.linspace(before, depth, steps + 1)[1:]:
+                state = problem.advance(state, at + (radius - 1e3 * down) * normal)
         except PalpateError:
             break
+        before = depth
         force[k] = 1e-6 * state.force @ normal
     return force
 

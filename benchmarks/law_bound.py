@@ -101,7 +101,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             if one.friction is None and laboratory > 0:
                 laboratory -= 1
                 truth["split"] = kept("press solver 3, split", shape, one, own_solver(mesh, coupled=False))
-                truth["laboratory"] = kept("laboratory 1", shape, one, by_laboratory)
+                truth["laboratory"] = kept("laboratory 2", shape, one, by_laboratory)
             force, numbers = rendered(
                 mesh, one.point[None], one.normal[None], one.depths,
                 poisson_ratio=one.poisson_ratio, friction=one.friction,

@@ -7,7 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks._pressed_places import forces
+from benchmarks._known_shapes import SHAPES
+from benchmarks._pressed_places import forces, in_laboratory
+from palpate.scenes.laboratory.specimen import Fineness
 from tests.render.test_true_shape import FILLET, HEIGHT, RADIUS, filleted, meshed
 
 
@@ -24,3 +26,13 @@ def test_a_places_force_does_not_depend_on_the_mesh():
     assert (np.ptp(found, axis=0) / found.mean(axis=0)).max() < 0.015
     alone = np.array([forces(dataclasses.replace(mesh, shape=None), points, normals) for mesh in meshes])
     assert (np.ptp(alone, axis=0) / alone.mean(axis=0)).max() > 0.05
+
+
+def test_the_laboratory_gives_a_depth_one_force_whichever_depths_are_asked_on_the_way():
+    """A sticking tip that went 3 mm at once was pushed back 1.2 % less than one that went in five steps."""
+    dome, apex, up = SHAPES["dome"](), np.array([0.0, 0.0, 0.055]), np.array([0.0, 0.0, 1.0])
+    alone, after = (
+        in_laboratory(dome, apex, up, 1e-3 * np.array(depths), fineness=Fineness(3.0, 5.0, 1.0))[-1]
+        for depths in ([3.0], [0.5, 1.0, 1.5, 2.0, 3.0])
+    )
+    assert alone == pytest.approx(after, rel=1e-3)
