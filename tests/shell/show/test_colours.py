@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from matplotlib.colors import rgb_to_hsv, to_hex, to_rgb
 
 from palpate.show import story as say
 from palpate.show import story_of
@@ -30,6 +30,15 @@ def test_each_colour_is_that_of_one_thing():
     assert len(set(every)) == len(every) and ON_BLACK.keys() <= COLOURS.keys()
     assert colour_of("hunt-crossley-kh") == COLOURS["hunt-crossley"]
     assert colour_of("mujoco") == COLOURS["other-simulator"] and colour_of("fem") == COLOURS["fem"]
+
+
+@pytest.mark.parametrize("table", [COLOURS, ON_BLACK])
+def test_what_is_drawn_in_one_curve_differs_in_hue(table):
+    """Another simulator's force and the one with what was found were both green."""
+    drawn = ("other-simulator", "simplest", "fem"), ("found", "measured")
+    hues = [[rgb_to_hsv(to_rgb(table[thing]))[0] for thing in side] for side in drawn]
+    apart = np.abs(np.subtract.outer(*hues))
+    assert np.minimum(apart, 1 - apart).min() > 0.1
 
 
 def test_nothing_but_the_table_names_a_colour():
