@@ -174,7 +174,7 @@ class FiniteTip:
         if sideways < SLIDES:
             presses = along_the_normal(presses)
             fit = fitted(presses)
-        other_tips = ()
+        other_tips: tuple[UnderOtherTip, ...] = ()
         if placed is not None:
             other_tips = tuple(_under(presses, factor, fit, fitted) for factor in placed.open_radii)
         if self.options.modulus.exact:
