@@ -88,7 +88,7 @@ def _by_radius(
     off_m = float(np.hypot(_TRUE * given.size_m, np.median(touched.error_m)))
     nats = nats_for_radii(body, touched, found, off_m)
     stated, likelier = touched.tip_radius_m, max(nats, key=lambda factor: nats[factor])
-    other = dataclasses.replace(touched, tip_radius_m=likelier * stated)
+    other = touched.under(likelier * stated)
     # of another object's shape another tip may be likelier too, and lies off it all the same
     if nats[likelier] > PAYS and not _doubt(given, register(body, other), other, free=True):
         asked = "is it the diameter?" if likelier < 1 else "is that the diameter?"

@@ -85,6 +85,13 @@ class TouchedPoints:
     tip_radius_m: float
     support: tuple[np.ndarray, np.ndarray] | None = None
 
+    def under(self, tip_radius_m: float) -> TouchedPoints:
+        """The same by a tip of another radius, m: the support that it slid on lies that much nearer."""
+        support = self.support
+        if support is not None:
+            support = support[0] + (self.tip_radius_m - tip_radius_m) * support[1], support[1]
+        return replace(self, tip_radius_m=tip_radius_m, support=support)
+
 
 @dataclass(frozen=True)
 class ShapeToPlace:
@@ -172,7 +179,7 @@ def nats_for_radii(
             way * stated + off_m * _SIZES,
         ]
         for radius in np.concatenate(about):
-            solver.touched = replace(touched, tip_radius_m=max(radius, 0.0))
+            solver.touched = touched.under(max(radius, 0.0))
             cost, pose = solver.descend(pose, 2 * _SHORT)
             for each in lost:
                 gap = (radius - each * stated) / off_m

@@ -125,6 +125,19 @@ def test_touches_from_all_sides_tell_a_diameter_from_a_radius(stated, true):
     assert nats_for_radii(body, wrong, register(body, wrong), off_m)[true] > PAYS
 
 
+def test_a_support_that_was_traced_by_another_tip_lies_elsewhere_too():
+    """With the foot held where a tip of twice the radius had traced it, another object's shape was named."""
+    shape = wedge()
+    body = ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0]))
+    told, turn, shift = touched(shape, seed=5)
+    up = turn.apply([0, 0, 1.0])
+    right = dataclasses.replace(told, support=(shift, up))
+    assert max(nats_for_radii(body, right, register(body, right), 5e-4).values()) < -PAYS
+    wrong = dataclasses.replace(told, tip_radius_m=2 * TIP_M, support=(shift - TIP_M * up, up))
+    assert nats_for_radii(body, wrong, register(body, wrong), 5e-4)[0.5] > PAYS
+    assert wrong.under(TIP_M).support[0] == pytest.approx(shift)
+
+
 def test_touches_from_one_side_leave_the_radius_open():
     shape = wedge()
     body = ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0]))
