@@ -32,7 +32,12 @@ from palpate.reconstruction.steps.s3_contacts.contacts import ContactOptions
 from palpate.reconstruction.steps.s4_surface import CastPoints, Surface, SurfaceOptions
 from palpate.reconstruction.steps.s5_mesh.meshing import MeshingOptions, uncertainty_at
 from palpate.reconstruction.steps.s6_one_d import OneD, fit_paper, fit_robust
-from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
+from palpate.reconstruction.steps.s7_modulus.modulus import (
+    ModulusFit,
+    ModulusOptions,
+    UnderOtherTip,
+    fit_modulus,
+)
 from palpate.reconstruction.steps.s7_modulus.modulus_field import FieldOptions
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from palpate.reconstruction.steps.s7_modulus.shape_error import compliance_covariance
@@ -103,7 +108,8 @@ class ModulusOnMesh:
     """The modulus, Pa, by one of the methods, and the mesh (linear or quadratic) that it holds on.
 
     presses: what it was fitted to. sideways: their sideways force over that of a tip that sticks, NaN where
-    few are pressed obliquely or the shape is not known (`steps.s7_modulus.sideways`).
+    few are pressed obliquely or the shape is not known (`steps.s7_modulus.sideways`). other_tips: what it
+    would be under tips that the first touches leave open.
     """
 
     mesh: TetMesh
@@ -116,6 +122,7 @@ class ModulusOnMesh:
     paper_fit: PaperFit | None = None
     solved: FittedSolution | None = None
     sideways: float = float("nan")
+    other_tips: tuple[UnderOtherTip, ...] = ()
 
     @property
     def misfit_n(self) -> np.ndarray | None:
@@ -167,6 +174,9 @@ class FiniteTip:
         if sideways < SLIDES:
             presses = along_the_normal(presses)
             fit = fitted(presses)
+        other_tips: tuple[UnderOtherTip, ...] = ()
+        if placed is not None:
+            other_tips = tuple(_under(presses, factor, fit, fitted) for factor in placed.open_radii)
         if self.options.modulus.exact:
             clock.lap("modulus")
             solved = FittedSolution(
@@ -177,8 +187,18 @@ class FiniteTip:
             sites = dataclasses.replace(sites, factors=solved.presses.factors[fit.press.law])
         return ModulusOnMesh(
             mesh, presses, fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa, sites, fit, solved=solved,
-            sideways=sideways,
+            sideways=sideways, other_tips=other_tips,
         )  # fmt: skip
+
+
+def _under(
+    presses: Presses, factor: float, fit: ModulusFit, fitted: Callable[[Presses], ModulusFit]
+) -> UnderOtherTip:
+    """The modulus of presses under a tip of a factor times their radius."""
+    other = dataclasses.replace(presses, tip_radius_m=factor * presses.tip_radius_m)
+    again = fitted(other)
+    misfit = np.sqrt(np.mean(again.press.rms_n**2) / np.mean(fit.press.rms_n**2))
+    return UnderOtherTip(other.tip_radius_m, again.modulus_pa, float(misfit))
 
 
 def _solve(

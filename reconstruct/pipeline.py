@@ -59,7 +59,7 @@ from palpate.reconstruction.steps.s4_surface import (
 from palpate.reconstruction.steps.s5_mesh.meshing import BackgroundMesher, Meshing, uncertainty_at
 from palpate.reconstruction.steps.s6_one_d import OneD, columns, profiles
 from palpate.reconstruction.steps.s7_modulus.held_out import HeldOutErrors, held_out, modulus_by_others
-from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit
+from palpate.reconstruction.steps.s7_modulus.modulus import ModulusFit, UnderOtherTip
 from palpate.reconstruction.steps.s7_modulus.modulus_field import with_fitted_field
 from palpate.reconstruction.steps.s7_modulus.modulus_paper import PaperFit
 from palpate.reconstruction.steps.s7_modulus.sideways import SLIDES
@@ -73,7 +73,8 @@ class Reconstruction(Result):
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
     held_out: how the model predicts places that were held out; None by the method paper, or of one place.
     exact: touched places that were solved. fitted_presses: what the modulus was fitted to; sideways: their
-    sideways force over that of a tip that sticks (`steps.s7_modulus.sideways`). `plot`: force over time
+    sideways force over that of a tip that sticks (`steps.s7_modulus.sideways`). other_tips: the modulus by
+    tips that the first touches on a known shape leave open. `plot`: force over time
     with the touches that were found. `show`: the model.
     """
 
@@ -93,6 +94,7 @@ class Reconstruction(Result):
     exact: FittedSolution | None = None
     fitted_presses: Presses | None = None
     sideways: float = float("nan")
+    other_tips: tuple[UnderOtherTip, ...] = ()
 
     @property
     def slides(self) -> bool:
@@ -338,6 +340,7 @@ def _concluded(
         exact=fitted.solved,
         fitted_presses=fitted.presses,
         sideways=fitted.sideways,
+        other_tips=fitted.other_tips,
     )
 
 

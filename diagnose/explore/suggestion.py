@@ -257,8 +257,9 @@ class Explored(Result):
     """An exploration so far, by `Explorer.explored`.
 
     path: of its recording, "" where none was written. last: what would be done next, or the word to stop with
-    its reason. estimate: shape, touches and modulus. truth: of a phantom, the stated values. It prints, plots
-    (modulus and surface over the touches), and writes its page.
+    its reason. estimate: shape, touches and modulus. truth: of a phantom, the stated values. said: operands
+    of the command that made it, by name. It prints, plots (modulus and surface over the touches), and writes
+    its page.
     """
 
     path: str
@@ -268,6 +269,7 @@ class Explored(Result):
     goals: GoalOptions
     estimate: ExplorationEstimate
     truth: Mapping[str, Any] = field(default_factory=dict)
+    said: Mapping[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """The figures of `palpate explore --json`."""

@@ -272,12 +272,37 @@ def _same_clock(t: np.ndarray, force: np.ndarray, presses: Presses) -> None:
     in_presses = np.corrcoef(measured, as_read)[0, 1] if as_read.std() > 0 else 0.0
     as_it_is = max(float(likeness[starts == first].sum()), float(in_presses))
     if abs(lag) > LAG_S and likeness[best] > max(as_it_is + BETTER, LEAST_LIKE):
+        lag, error = _fine_lag(t, np.linalg.norm(force, axis=1), presses, lag)
         raise OptionError(
             f"the simulated forces fit the recording {lag:+.3g} s later far better (likeness "
             f"{likeness[best]:.2f} against {as_it_is:.2f}): is it another clock? State "
             "the offset that you know of it (a lag of the simulator's own stays apart), else "
-            f"--clock-offset {lag:.12g} (with its lag in it), or 0 to keep it as it is"
+            f"--clock-offset {round(lag, 4):.12g} (+- {1e3 * error:.2g} ms, with its lag in it), or 0 to "
+            "keep it as it is"
         )
+
+
+def _fine_lag(t: np.ndarray, size: np.ndarray, presses: Presses, lag: float) -> tuple[float, float]:
+    """The lag, s, near a rough one that forces of size (n,) N at t (n,) s fit the presses best by, least
+    squares, and its standard error by how the presses scatter."""
+    lags = lag + _GRID_S * np.array([-1.0, 1.0])
+    there = (presses.onset_s >= t[0] + lags[1]) & (presses.end_s <= t[-1] + lags[0])
+    rows = presses.counted & there[presses.press]
+    clock, press = presses.t[rows], presses.press[rows]
+    measured = np.linalg.norm((presses.force - presses.free_air)[rows], axis=1)
+    step, error = max(float(np.median(np.diff(t))), 1.0 / presses.sample_rate_hz), _GRID_S
+    for _ in range(20):
+        ahead, here, behind = (np.interp(clock - lag + shift, t, size) for shift in (-step, 0.0, step))
+        gain = (measured @ here) / max(here @ here, 1e-300)
+        slope = gain * (ahead - behind) / (2 * step)
+        off = slope * (measured - gain * here)
+        square = max(slope @ slope, 1e-300)
+        change = float(np.clip(off.sum() / square, -_GRID_S, _GRID_S))
+        error = float(np.sqrt((np.bincount(press, off) ** 2).sum()) / square)
+        lag = float(np.clip(lag + change, *lags))
+        if abs(change) < 1e-6:
+            break
+    return lag, error
 
 
 def _same_direction(at: np.ndarray, presses: Presses, rows: np.ndarray) -> None:

@@ -78,6 +78,8 @@ def checked_samples(
         return CheckedSamples()
     if len(recording.t) < _LEAST_SAMPLES:
         return CheckedSamples((_too_short(recording),) if by_hand else ())
+    if by_hand and how_to_go_on(recording) and all(each.kind != "press" for each in recording.segments):
+        return CheckedSamples((_without_presses(recording),))
     if not by_hand:
         data = Samples(recording, cutoff_hz=cutoff_hz)
         return CheckedSamples(ordered([*handedness(data), *asked(data)]), data)
@@ -236,6 +238,20 @@ def _too_short(recording: Recording) -> Finding:
         np.inf,
         (float(recording.t[0]), float(recording.t[-1])),
         ways=OF_A_KNOWN_OBJECT,
+    )
+
+
+def _without_presses(recording: Recording) -> Finding:
+    """An exploration that ended before its first press, whose samples show nothing of drift or noise."""
+    return Finding(
+        "no presses",
+        f"it ended after {recording.duration_s:.0f} s, before anything was pressed",
+        "its segments say so",
+        how_to_go_on(recording),
+        np.inf,
+        np.inf,
+        (float(recording.t[0]), float(recording.t[-1])),
+        ways=(),
     )
 
 

@@ -20,10 +20,12 @@ from palpate.mechanics.shape.flat_foot import Standing, direction, standing
 from palpate.mechanics.shape.tetmesh import vertex_normals
 from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.reconstruction.geometry.registration import (
+    PAYS,
     SURFACE_SD_M,
     Registration,
     ShapeToPlace,
     TouchedPoints,
+    nats_for_radii,
     off_surface,
     register,
 )
@@ -70,11 +72,34 @@ def place(
     support = _traced_support(first) if traces else None
     body = ShapeToPlace(stood.vertices, stood.triangles, stood.support_point, stood.support_normal)
     touched = _touched(presses, support)
-    found = register(body, touched, free=options.pose == "auto")
+    free = options.pose == "auto"
+    found = register(body, touched, free=free)
     progress("registration", 1.0)
     _check(given, found, options)
     placed = _placed(given, stood, found, options, spacing_m, presses.tip_radius_m)
-    return dataclasses.replace(placed, doubt=_doubt(given, found, touched, free=options.pose == "auto"))
+    placed = dataclasses.replace(placed, doubt=_doubt(given, found, touched, free))
+    return _by_radius(placed, given, body, touched, found) if free else placed
+
+
+def _by_radius(
+    placed: Placed, given: ClosedSurface, body: ShapeToPlace, touched: TouchedPoints, found: Registration
+) -> Placed:
+    """The same with what the first touches say of the tip's radius, beside the pose."""
+    off_m = float(np.hypot(_TRUE * given.size_m, np.median(touched.error_m)))
+    nats = nats_for_radii(body, touched, found, off_m)
+    stated, likelier = touched.tip_radius_m, max(nats, key=lambda factor: nats[factor])
+    other = touched.under(likelier * stated)
+    # of another object's shape another tip may be likelier too, and lies off it all the same
+    if nats[likelier] > PAYS and not _doubt(given, register(body, other), other, free=True):
+        asked = "is it the diameter?" if likelier < 1 else "is that the diameter?"
+        doubt = (
+            f"the tip's radius may not be {1e3 * stated:.3g} mm: first touches lie on '{given.name}' under "
+            f"one of {1e3 * other.tip_radius_m:.3g} mm, more than 1000 times likelier; {asked}"
+        )
+        return dataclasses.replace(placed, doubt=doubt, likelier_radius_m=other.tip_radius_m)
+    if placed.doubt:
+        return placed
+    return dataclasses.replace(placed, open_radii=tuple(f for f in nats if nats[f] > -PAYS))
 
 
 def _touched(presses: Presses, support: tuple[np.ndarray, np.ndarray] | None) -> TouchedPoints:
@@ -117,7 +142,7 @@ def _check(given: ClosedSurface, found: Registration, options: GeometryOptions) 
     )
 
 
-def _doubt(given: ClosedSurface, found: Registration, touched: TouchedPoints, *, free: bool) -> str:
+def _doubt(given: ClosedSurface, found: Registration, touched: TouchedPoints, free: bool) -> str:
     """Why the shape is another object's; '' where first touches lie on it as they can, or are too few."""
     off = off_surface(found.residual_m, touched.site, touched.error_m, _TRUE * given.size_m, 6 * free)
     if off is None or not off.words:

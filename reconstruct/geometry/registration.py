@@ -11,7 +11,7 @@ Source: point-to-plane registration after Chen and Medioni (1992); starts and we
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -30,7 +30,7 @@ _ALIKE_M = 0.02
 """Of the size: poses whose surfaces lie nearer than this are one."""
 
 
-_PAYS = 7.0
+PAYS = 7.0
 """Nats by which touches must be likelier under a turn before it is made: odds of a thousand to one. A round
 cap slides about its own middle and meets them in any pose."""
 _ALL, _ABOUT_UP, _NO_TURN = np.arange(6), np.array([0, 1, 2, 5]), np.arange(3)
@@ -84,6 +84,13 @@ class TouchedPoints:
     site: np.ndarray
     tip_radius_m: float
     support: tuple[np.ndarray, np.ndarray] | None = None
+
+    def under(self, tip_radius_m: float) -> TouchedPoints:
+        """The same by a tip of another radius, m: the support that it slid on lies that much nearer."""
+        support = self.support
+        if support is not None:
+            support = support[0] + (self.tip_radius_m - tip_radius_m) * support[1], support[1]
+        return replace(self, tip_radius_m=tip_radius_m, support=support)
 
 
 @dataclass(frozen=True)
@@ -145,6 +152,39 @@ def register(body: ShapeToPlace, touched: TouchedPoints, *, free: bool = True) -
     others = [solver.evaluate(p) for _, p in best[1:] if solver.apart(pose, p)]
     rival = min((other.rms for other in others), default=np.inf)
     return solver.result(pose, fit, np.linalg.inv(fit.known), float(rival))
+
+
+OTHER_RADII = (0.5, 2.0)
+"""A tip's radius is stated as its diameter, or a diameter as the radius."""
+_SIZES, _STEPS = np.linspace(-2.0, 2.0, 5), 8
+
+
+def nats_for_radii(
+    body: ShapeToPlace, touched: TouchedPoints, found: Registration, off_m: float
+) -> dict[float, float]:
+    """By how many nats first touches are likelier under each of OTHER_RADII times the stated radius.
+
+    found: the pose by the stated one. off_m: standard deviation of the whole surface along its normals, m: a
+    cast that shrank moves every touch as another tip does. Touches from one side tell neither, as the pose
+    takes the difference up.
+    """
+    solver, stated = _Solver(body, touched), touched.tip_radius_m
+    lost = {factor: np.inf for factor in (1.0, *OTHER_RADII)}
+    for way in OTHER_RADII:
+        pose = _Pose(found.rotation, found.shift_m)
+        # in small steps, or the pose is left behind
+        about = [
+            stated + off_m * _SIZES,
+            stated * np.linspace(1.0, way, _STEPS),
+            way * stated + off_m * _SIZES,
+        ]
+        for radius in np.concatenate(about):
+            solver.touched = touched.under(max(radius, 0.0))
+            cost, pose = solver.descend(pose, 2 * _SHORT)
+            for each in lost:
+                gap = (radius - each * stated) / off_m
+                lost[each] = min(lost[each], cost + gap**2 / 2)
+    return {factor: lost[1.0] - lost[factor] for factor in OTHER_RADII}
 
 
 @dataclass(frozen=True)
@@ -216,7 +256,7 @@ class _Solver:
         turns = _upright(self.body.up, np.array([0.0, 0.0, 1.0]), 24)
         upright = [self.descend(_Pose(turn, self._shift(turn)), _SHORT, _ABOUT_UP) for turn in turns]
         upright = [self.descend(min(upright, key=lambda each: each[0])[1], _LONG, _ABOUT_UP)]
-        return next((each for c, each in (as_filed, *upright) if c < cost + _PAYS), pose)
+        return next((each for c, each in (as_filed, *upright) if c < cost + PAYS), pose)
 
     def descend(self, pose: _Pose, rounds: int, free: np.ndarray = _ALL) -> tuple[float, _Pose]:
         """Damped Gauss-Newton in the numbers `free` of the pose; the cost and pose at its end."""

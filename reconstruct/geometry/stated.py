@@ -35,8 +35,9 @@ class Placed:
     surface: closed, its uncertainty that of pose and file together. local_sd_m: of the file alone. pose: its
     error, None where it is taken as given. mesh: of a slab, which needs no mesher; None for a shape. base:
     as a tracing would give it. residual_m: (k,) of the first touches. about: what model.toml keeps,
-    [geometry]. notes: what the user should know, one line each. doubt: why it may be another object's, ''
-    where the touches lie on it.
+    [geometry]. notes: what the user should know, one line each. doubt: why it may be another object's, or
+    the tip another one, '' where the touches lie on it. likelier_radius_m: of that tip, or None. open_radii:
+    factors on the stated radius that the touches, the pose being fitted, do not rule out.
     """
 
     surface: Surface
@@ -48,6 +49,8 @@ class Placed:
     about: dict[str, Any]
     notes: tuple[str, ...]
     doubt: str = ""
+    likelier_radius_m: float | None = None
+    open_radii: tuple[float, ...] = ()
 
     @property
     def by_itself(self) -> Surface:

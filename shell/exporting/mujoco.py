@@ -12,16 +12,24 @@ from pathlib import Path
 import numpy as np
 
 from palpate.exporting.subject import Subject
+from palpate.mechanics.progress import silent
 from palpate.render.options import BEST
-from palpate.render.simulators.mujoco import MuJoCo, scene_xml
+from palpate.render.registry import create
+from palpate.render.replay import replay
+from palpate.render.simulators.mujoco import MuJoCo, force_on_tip, scene_xml
 from palpate.show.colours import COLOURS
 from palpate.show.scenery import AZIMUTH_DEG, ELEVATION_DEG, view_axes
+from palpate.words import mm, mn
 
 FILE_SETTINGS = "material=1,skin_m=1e-4"
 """A file's flex is a Saint Venant-Kirchhoff solid, which gives way where it is crushed; its radius, by which
 the surface stands off, makes up for that in a shallow press."""
 DEPTH_RADII = 1 / 6
 """Depth of a press that nobody said, in radii of the tip: a flex of a file softens under a deeper one."""
+DEEP_RADII = 0.5
+"""Depth of the press that shows how much, in radii of the tip."""
+_SETTLED, _READ = 200, 50
+"""Steps of 1 ms until a tip that is led there stands, and those of them that are read."""
 DRIVE_N_PER_M = 1e7
 """Of the tip: a newton moves it by a tenth of a micrometre, and it follows what it is led to by 20 ms."""
 
@@ -69,6 +77,29 @@ def write(path: Path, subject: Subject) -> tuple[str, ...]:
     return (
         f"the tip waits above the object: `data.ctrl[:] = [{move}]` presses it in, within some 20 ms",
         *subject.run_notes(MuJoCo, FILE_SETTINGS),
-        "a flex softens under a deep dent: compare presses of a sixth of the tip's radius, or set elastic3d "
-        "of its MjSpec to 1 (stable neo-Hookean), which no file can say",
+        f"a flex softens under a deep dent{_softened(path, subject)}: compare presses of a sixth of the "
+        "tip's radius, or set elastic3d of its MjSpec to 1 (stable neo-Hookean), which no file can say",
+    )
+
+
+def _softened(path: Path, subject: Subject) -> str:
+    """What the file and the model give at a deeper press, in words; '' where MuJoCo is not installed."""
+    try:
+        import mujoco
+    except ImportError:
+        return ""
+    height = float(subject.model.support.height(subject.top[None])[0])
+    depth_m = min(DEEP_RADII * subject.radius_m, 0.5 * height)
+    deep = subject.top + (subject.radius_m - depth_m) * subject.normal
+    scene = mujoco.MjModel.from_xml_path(str(path))
+    data, felt = mujoco.MjData(scene), []
+    for _ in range(_SETTLED):
+        data.ctrl[:] = deep - subject.near
+        mujoco.mj_step(scene, data)
+        felt.append(float(force_on_tip(mujoco, scene, data) @ subject.normal))
+    way = np.linspace(subject.near, deep, _SETTLED)
+    own = replay(create("fem", subject.model), 1e-3 * np.arange(_SETTLED), way, progress=silent)
+    return (
+        f" ({mm(depth_m)} deep this one reads {mn(float(np.mean(felt[-_READ:])))} here, the model "
+        f"{mn(float(own[-1] @ subject.normal))})"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,9 +22,9 @@ Step = str | Callable[[], Sequence[str]]
 
 @dataclass
 class Call:
-    """One call of an operation, beside its operands. wanted: whether or where progress goes; command: its
-    name on the command line, '' for a Python call; out: what a command says on the way, silent in a Python
-    call.
+    """One call of an operation. given: its operands that were given, by name; wanted: whether or where
+    progress goes; command: its name on the command line, '' for a Python call; out: what a command says on
+    the way, silent in a Python call.
 
     What a command does with the result comes after: it says the result's lines (unless `said`, on the way),
     then `steps`, then `following` (None: what the result's kind advises), writes the result's JSON with
@@ -34,6 +34,7 @@ class Call:
 
     wanted: bool | Progress = True
     command: str = ""
+    given: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     out: Output = dataclasses.field(default_factory=lambda: Output("-"))
     steps: list[Step] = dataclasses.field(default_factory=list)
     following: Sequence[Step] | None = None

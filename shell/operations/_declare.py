@@ -331,6 +331,7 @@ class Operation:
             kind = written(self.fields[name]).kind()
             if kind is not None and value is not None and str(value) not in STREAMS:
                 check_target(value, kind)
+        call.given = dict(given)
         importlib.import_module("palpate.show")  # lets every result say and draw itself
         arguments = self.arriving(given) | ({self.takes_call: call} if self.takes_call else {})
         bound = inspect.BoundArguments(self.declaration, arguments)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -35,6 +35,7 @@ from palpate.mechanics.recording.recording import read_recording
 from palpate.operations._call import Call
 from palpate.operations._declare import Given, operation, option
 from palpate.operations._shared import PhantomFileOptions, Seed, output_option, report_option
+from palpate.operations._written import typed
 from palpate.operations.simulate import effects_from
 from palpate.robot import LaboratoryRobot, RobotOptions, serve
 from palpate.scenes.laboratory.session import SimulateOptions
@@ -121,7 +122,7 @@ def explore(
     if (phantom is not None) + robot + (device is not None) != 1:
         raise OptionError("give who touches: one of --phantom NAME, --robot and --device NAME")
     check_goals(goals)
-    _give_way(going_on, output)
+    _give_way(going_on, output, call)
     begun = partial(_explorer, going_on, goals, reach, seed)
     said = {
         "scene": scene, "screenshot": screenshot, "seconds": seconds, "effects": effects,
@@ -143,6 +144,7 @@ def explore(
         errs = RobotOptions(**errors)
         explored = LaboratoryRobot(thing, acting, seed=seed, options=options, robot=errs)
         result = _on_phantom(begun, output, explored, goals.most, call)
+    result = replace(result, said=call.given)
     call.said = True
     if robot:  # whose lines are all JSON
         if report is not None:
@@ -171,7 +173,7 @@ def _refuse_idle(who: str, said: Mapping[str, Any]) -> None:
         raise OptionError(f"{flag} goes with {others}, not with {who}")
 
 
-def _give_way(going_on: str | None, output: str) -> None:
+def _give_way(going_on: str | None, output: str, call: Call) -> None:
     """Say that a recording which is there is replaced. What is gone on with may be: it is read first, and
     every file that is written holds all of it. Raises OptionError where no exploration wrote that."""
     file, _ = written_at(output, SAMPLES)[0]
@@ -179,7 +181,8 @@ def _give_way(going_on: str | None, output: str) -> None:
         return
     if going_on is None or not any(file.samefile(each) for each in recording_files(Path(going_on))):
         warn(
-            f"{file} is there, and is replaced after the first touch; `--continue {file}` goes on with it",
+            f"{file} is there, and is replaced after the first touch; to go on with it: "
+            f"`{typed('explore', {**call.given, 'going_on': file})}`",
             PalpateWarning, stacklevel=2,
         )  # fmt: skip
     elif not read_recording(going_on).segments:
@@ -189,13 +192,13 @@ def _give_way(going_on: str | None, output: str) -> None:
 
 
 @contextmanager
-def _kept(explorer: Explorer, output: str, call: Call) -> Iterator[None]:
-    """Where it is interrupted, what was kept and how to go on."""
+def _kept(explorers: list[Explorer], output: str, call: Call) -> Iterator[None]:
+    """Where it is interrupted, what was kept and how to go on. explorers: none before one has begun."""
     try:
         yield
     except KeyboardInterrupt:
-        if explorer.segments:
-            result = explorer.explored(output)
+        for explorer in (each for each in explorers if each.segments):
+            result = replace(explorer.explored(output), said=call.given)
             call.out.say(f"interrupted; kept in {output}", *result.lines(), *next_lines(result))
         raise
 
@@ -230,12 +233,14 @@ def _in_window(begun: Begun, output: str, scene: str, given: Mapping[str, Any], 
     from palpate.window.guide import Guide
 
     kept: list[Explorer] = []
+    guides: list[Guide] = []
 
     def guided(session: TouchSession) -> Guide:
         servo, nu = session.servo, session.model.material.poisson_ratio
         about = {"object_name": session.title, "poisson_ratio": nu}
         kept.append(begun(Instrument(servo.tip_radius_m, servo.options.rate_hz, about), nu))
-        return Guide(kept[-1], servo, session.model, session.worker, output)
+        guides.append(Guide(kept[-1], servo, session.model, session.worker, output))
+        return guides[-1]
 
     said = {name: value for name, value in given.items() if value is not None}
     if why := no_screen():
@@ -243,7 +248,12 @@ def _in_window(begun: Begun, output: str, scene: str, given: Mapping[str, Any], 
             f"{why}: watch a simulated robot explore (`palpate explore --phantom dome -o REC`), or use "
             f"{VIRTUAL_SCREEN}"
         )
-    touched = touch(scene, guide=guided, **said)
+    with _kept(kept, output, call):
+        try:
+            touched = touch(scene, guide=guided, **said)
+        finally:
+            for guide in guides:
+                guide.keep_tracing()
     if touched is not None:
         call.out.say(*touched.lines())
     call.out.say(_line(kept[-1].suggest(), kept[-1].state))
@@ -272,7 +282,7 @@ def _on_phantom(begun: Begun, output: str, robot: LaboratoryRobot, most: int, ca
     explorer = begun(robot.instrument, robot.phantom.poisson_ratio)
     robot.made = sum(s.kind == "press" for s in explorer.segments)
     before: ExplorationState | None = None
-    with _kept(explorer, output, call), call.progress("explore") as show_progress:
+    with _kept([explorer], output, call), call.progress("explore") as show_progress:
         while True:
             made = explorer.state.made
             show_progress(f"touch {made + 1} of at most {most}", min(made / most, 1.0))

@@ -265,6 +265,7 @@ RECONSTRUCT = table(
     findings=many(FINDING),
     doubt=TEXT,
     sideways_share=MAYBE,
+    other_tips=many(table(radius_m=NUMBER, young_modulus_pa=NUMBER, misfit_ratio=NUMBER)),
     held_out_rmse_n=MAYBE,
     held_out_constant_rmse_n=MAYBE,
     held_out_floor=or_null(TEXT),

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.diagnosis.explore.suggestion import Explored, Step
+from palpate.operations._written import typed
+from palpate.reconstruction.steps.s3_contacts.first_touch import GOES_ON
 from palpate.show import story as say
 from palpate.show.colours import COLOURS
 from palpate.show.page import drawn, file_words
@@ -39,8 +41,11 @@ def story(result: Explored) -> say.Story:
     yield say.Sentence(f"{soft_words}The exploration {why}", on=say.PAGE)
     if state.trouble:
         yield say.Sentence(f"The last touch could not be used: {state.trouble}", on=say.PAGE)
-    more = f" --most {2 * state.made}" if result.last.kind == "stop" else ""
-    go_on = f"go on: the same command with `--continue {recording}{more}`"
+    same = {"output": result.path, "going_on": result.path}
+    more = {"most": 2 * state.made} if result.last.kind == "stop" else {}
+    go_on = f"go on: `{typed('explore', {**(result.said or {'device': 'mouse'}), **same, **more})}`"
+    if not result.said:
+        go_on += f" ({GOES_ON})"
     if not result.path:
         go_on = "begin anew: nothing was taken in, and nothing written"
     model = f"make a model of it: `palpate reconstruct {recording} -o MODEL`"

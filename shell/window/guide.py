@@ -17,7 +17,7 @@ import pyvista
 
 from palpate.diagnosis.explore.estimate import LEAST_PRESSES
 from palpate.diagnosis.explore.explorer import ExplorationState, Explorer, Suggestion
-from palpate.diagnosis.explore.segments import Segment
+from palpate.diagnosis.explore.segments import LEAST_SAMPLES, Segment
 from palpate.mechanics.model.model import Model
 from palpate.servo import Servo
 from palpate.show.colours import COLOURS
@@ -99,6 +99,9 @@ class Guide:
         self._servo, self._worker, self._path = servo, worker, path
         self._model, self._support = model, model.support
         self._tracing = BaseTracing(model)
+        for each in (s for s in explorer.segments if s.kind == "trace"):
+            self._tracing.add(each.position, np.arange(len(each.t)))
+        self._share_kept = self._tracing.share
         self._next = int(servo.arrays.ring_head[0])
         self._rows: list[np.ndarray] = []
         self._first: int | None = None
@@ -151,6 +154,15 @@ class Guide:
         if self._still_tracing or lasted >= LEAST_S:
             self._take_in()
 
+    def keep_tracing(self) -> None:
+        """At a session's end: take in what was traced of a foot not gone round yet, to go on with."""
+        grown = self._tracing.share > self._share_kept
+        if self.suggestion.kind != "trace" or self._thinking or not self._rows or not grown:
+            return
+        rows, self._rows = np.concatenate(self._rows), []
+        if len(rows) >= LEAST_SAMPLES:
+            self._think(rows)
+
     @property
     def _still_tracing(self) -> bool:
         """Whether the base was not all gone round yet, or not so that it was understood."""
@@ -163,7 +175,7 @@ class Guide:
 
     def _take_in(self) -> None:
         rows, self._rows = np.concatenate(self._rows), []
-        self._taken += 1
+        self._taken, self._share_kept = self._taken + 1, self._tracing.share
 
         def job() -> None:
             try:

@@ -647,7 +647,19 @@ def test_a_file_that_ends_early_is_judged_by_the_presses_that_it_covers(world):
     with pytest.raises(OptionError, match="--clock-offset") as refused:
         aligned(Forces(t + late, force, "x"), presses, plain)
     offset = float(re.search(r"--clock-offset (-?[\d.]+)", str(refused.value))[1])
-    assert offset == pytest.approx(-late, abs=0.05)
+    assert offset == pytest.approx(-late, abs=2e-4)
+
+
+@pytest.mark.parametrize("late", [-1.0037, 0.5123])
+def test_the_clock_that_is_suggested_lies_on_no_grid(world, late):
+    """It was a multiple of 20 ms, and 10 ms too much were named numerical damping."""
+    recording, model, _, force, _ = world
+    noisy = 1.3 * force + np.random.default_rng(0).normal(0, 0.02, force.shape)
+    with pytest.raises(OptionError, match="--clock-offset") as refused:
+        aligned(Forces(recording.t + late, noisy, "x"), model.presses, ForcesOptions())
+    offset, error = re.search(r"--clock-offset (-?[\d.]+) \(\+- ([\d.]+) ms", str(refused.value)).groups()
+    assert float(offset) == pytest.approx(-late, abs=1e-3)
+    assert abs(float(offset) + late) < 4e-3 * float(error) + 5e-5 and float(error) < 1
 
 
 def test_forces_between_the_presses_deny_no_clock(world):

@@ -57,6 +57,23 @@ def test_first_touches_tell_another_objects_shape(touches, tmp_path, name):
         assert "another object's shape" in put.doubt and len(put.doubt.splitlines()) == 1
 
 
+def test_first_touches_tell_that_the_tips_diameter_was_given_for_its_radius(touches, tmp_path):
+    recording, found = touches
+    options = GeometryOptions(shape=stl(tmp_path, "right"), unit="m")
+
+    def put(factor: float):
+        presses = dataclasses.replace(found.presses, tip_radius_m=factor * found.presses.tip_radius_m)
+        by = dataclasses.replace(found, presses=presses)
+        return place(by, options, mesh_size_m=0.01, spacing_m=0.003)
+
+    stated = recording.tip_radius_m
+    assert put(1.0).doubt == "" and put(1.0).open_radii == ()
+    for factor in (2.0, 0.5):
+        other = put(factor)
+        assert other.likelier_radius_m == pytest.approx(stated)
+        assert f"under one of {1e3 * stated:.3g} mm" in other.doubt
+
+
 def test_first_touches_tell_that_an_object_is_not_flat(touches):
     _, found = touches
     recording = raster()

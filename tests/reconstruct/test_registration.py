@@ -13,7 +13,14 @@ from scipy.spatial.transform import Rotation
 from palpate.mechanics.compliance.sites import touch_sites, touch_solver
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.shape.tetmesh import box_mesh, vertex_normals
-from palpate.reconstruction.geometry.registration import Registration, ShapeToPlace, TouchedPoints, register
+from palpate.reconstruction.geometry.registration import (
+    PAYS,
+    Registration,
+    ShapeToPlace,
+    TouchedPoints,
+    nats_for_radii,
+    register,
+)
 from palpate.reconstruction.steps.s3_contacts.left_out import sliding
 from palpate.reconstruction.steps.s7_modulus.shape_error import PoseError, compliance_covariance
 
@@ -103,6 +110,42 @@ def test_a_round_cap_is_not_turned_where_no_touch_asks_for_it():
     found = register(ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0])), told)
     assert found.rotation[2, 2] > np.cos(np.radians(1))
     assert found.shift_m == pytest.approx(shift, abs=2e-4)
+
+
+@pytest.mark.parametrize(("stated", "true"), [(2.0, 0.5), (0.5, 2.0)])
+def test_touches_from_all_sides_tell_a_diameter_from_a_radius(stated, true):
+    """The pose took a tip of twice the radius up, and the modulus was 10 kPa of 17 without a word."""
+    shape = wedge()
+    body = ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0]))
+    told, *_ = touched(shape, seed=5)
+    off_m = 0.005 * 0.1
+    right = nats_for_radii(body, told, register(body, told), off_m)
+    assert max(right.values()) < -PAYS
+    wrong = dataclasses.replace(told, tip_radius_m=stated * TIP_M)
+    assert nats_for_radii(body, wrong, register(body, wrong), off_m)[true] > PAYS
+
+
+def test_a_support_that_was_traced_by_another_tip_lies_elsewhere_too():
+    """With the foot held where a tip of twice the radius had traced it, another object's shape was named."""
+    shape = wedge()
+    body = ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0]))
+    told, turn, shift = touched(shape, seed=5)
+    up = turn.apply([0, 0, 1.0])
+    right = dataclasses.replace(told, support=(shift, up))
+    assert max(nats_for_radii(body, right, register(body, right), 5e-4).values()) < -PAYS
+    wrong = dataclasses.replace(told, tip_radius_m=2 * TIP_M, support=(shift - TIP_M * up, up))
+    assert nats_for_radii(body, wrong, register(body, wrong), 5e-4)[0.5] > PAYS
+    assert wrong.under(TIP_M).support[0] == pytest.approx(shift)
+
+
+def test_touches_from_one_side_leave_the_radius_open():
+    shape = wedge()
+    body = ShapeToPlace(*shape, np.zeros(3), np.array([0, 0, 1.0]))
+    told, *_ = touched(shape, seed=3, facing_up=0.7)
+    for factor in (0.5, 1.0, 2.0):
+        other = dataclasses.replace(told, tip_radius_m=factor * TIP_M)
+        nats = nats_for_radii(body, other, register(body, other), 0.005 * 0.1)
+        assert max(abs(n) for n in nats.values()) < PAYS
 
 
 def test_as_it_stands_only_the_residuals_are_told():

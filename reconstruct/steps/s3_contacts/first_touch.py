@@ -7,6 +7,7 @@ a contact that never breaks (`cycles`), and says of every other contact why it i
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -310,11 +311,16 @@ def _too_few(
     )
 
 
+GOES_ON = "with its --scene; or --phantom NAME or --robot, as it was begun"
+"""What an exploration's file does not hold of the command that goes on with it."""
+
+
 def how_to_go_on(recording: Recording) -> str:
     """How an exploration whose file this is goes on; '' of another recording."""
     if recording.path is None or not recording.segments:
         return ""
-    return f"go on exploring: the same `palpate explore` with --continue {recording.path}"
+    file = shlex.quote(str(recording.path))
+    return f"go on exploring: `palpate explore --device mouse --continue {file} --output {file}` ({GOES_ON})"
 
 
 def _check_loudness(

@@ -93,6 +93,16 @@ class ModulusFit:
     by_depth: tuple[tuple[float, float, bool], ...] = ()
 
 
+@dataclass(frozen=True)
+class UnderOtherTip:
+    """The modulus under a tip of another radius, m, Pa; misfit: the presses' rms over that under the stated
+    tip."""
+
+    radius_m: float
+    young_modulus_pa: float
+    misfit: float
+
+
 def fit_modulus(
     presses: Presses,
     sites: TouchSites,

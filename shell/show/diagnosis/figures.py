@@ -29,7 +29,7 @@ from palpate.show.diagnosis.gaps import (
 )
 from palpate.show.model import facing, usual_colourings, view_of_presses
 from palpate.show.page import new_figure
-from palpate.show.quantities import ERROR, MODULUS
+from palpate.show.quantities import AS_RECORDED, ERROR, FITTED, MODULUS
 from palpate.show.scenery import Colours, draw_object, view_axes
 from palpate.show.story import Picture
 from palpate.show.view3d import Colouring, Line, View
@@ -82,6 +82,7 @@ def view(result: Diagnosis, simulated: str = "simplest") -> View:
         each,
         "Measured less simulated, root mean square over each press; between presses what is near, "
         "paler where it was not touched.",
+        name=FITTED if simulated == "simplest" else AS_RECORDED,
         reach=_OVER_NOISE * result.noise_n,
     )
     force = "sideways" if sideways(result) else "into"

@@ -20,7 +20,7 @@ from palpate.reconstruction.steps.s6_one_d import low_passed
 from palpate.show import story as say
 from palpate.show.model import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.page import feel_step, file_words, subplots
-from palpate.show.quantities import ERROR, MODULUS, softness
+from palpate.show.quantities import AS_RECORDED, ERROR, MODULUS, softness
 from palpate.show.reconstruction.differences import differences, trend_words
 from palpate.show.reconstruction.exploration import damped_figure, geometry_figure, touches_figure
 from palpate.show.reconstruction.modulus import (
@@ -126,8 +126,20 @@ def _taken(result: Reconstruction) -> str:
     return f"for Poisson's ratio {ratio:.3g} ({who}), under {tip}"
 
 
+def _of_other_tips(result: Reconstruction) -> Iterator[str]:
+    """What the modulus would be under a tip that the first touches leave open."""
+    each = (
+        f"{mm(tip.radius_m)} would read as {kpa(tip.young_modulus_pa, '.1f')} (presses fit "
+        f"{percent(abs(tip.misfit - 1))} {'better' if tip.misfit < 1 else 'worse'})"
+        for tip in result.other_tips
+    )
+    if result.other_tips:
+        yield f"It rests on the tip's stated radius, which first touches leave open: {', '.join(each)}"
+
+
 def _meant(result: Reconstruction) -> say.Story:
     yield say.Detail(_taken(result), on=say.TEXT)
+    yield from map(say.Detail, _of_other_tips(result))
     if not result.doubt:
         words = meaning(result)
         yield from (say.Detail(said.removesuffix("."), on=say.TEXT) for said in words.split(". "))
@@ -258,7 +270,7 @@ def view(result: Reconstruction) -> View:
             "Model less measured, root mean square over each press, which the modulus was fitted to; between "
             "presses what is near."
         )
-        colourings.insert(1, Colouring(ERROR, None, each, words))
+        colourings.insert(1, Colouring(ERROR, None, each, words, name=AS_RECORDED))
         selected = int(np.argmax(each))
     return view_of_presses(model, shown, colourings, lines, selected)
 
@@ -323,7 +335,10 @@ def mending(result: Reconstruction) -> list[Way]:
     ways: list[Way] = []
     held_out = result.held_out
     made = result.model.provenance["options"]
-    if result.placed is not None and result.placed.doubt:
+    if result.placed is not None and result.placed.likelier_radius_m:
+        radius = result.placed.likelier_radius_m
+        ways.append(Way(f"the radius is {1e3 * radius:.3g} mm", {"tip_radius_m": radius}))
+    elif result.placed is not None and result.placed.doubt:
         ways += OF_A_SHAPE
     elif result.doubt and result.placed is not None and "file" in result.placed.about:
         up = "-z" if made["geometry"]["up"] != "-z" else "+z"
@@ -448,6 +463,7 @@ def _held_out(result: Reconstruction) -> dict[str, Any]:
 
 _LAW = ("young_modulus_pa", "misfit_n", "share")
 _DEPTH = ("depth_m", "young_modulus_pa", "consistent")
+_TIP: tuple[say.Key, ...] = ("radius_m", "young_modulus_pa", "misfit_ratio=misfit")
 _FIT: tuple[say.Key, ...] = (
     "dent_law=press.law",
     ("by_law", lambda fit: {law: dict(zip(_LAW, row, strict=True)) for law, row in fit.by_law.items()}),
@@ -481,6 +497,7 @@ KEYS: tuple[say.Key, ...] = (
     "findings",
     "doubt",
     "sideways_share=sideways",
+    ("other_tips", lambda result: [say.figures_of(tip, _TIP) for tip in result.other_tips]),
     _held_out,
     "noise_n=exploration.noise_n",
     "force_delay_s=exploration.delay_s",

@@ -10,6 +10,7 @@ from palpate.diagnosis.explore.segments import Instrument, Segment, join, split
 from palpate.mechanics.errors import RecordingError
 from palpate.mechanics.recording.recording import read_recording, write_recording
 from palpate.mechanics.recording.segments import TimeSegment as Stretch
+from palpate.reconstruction.checks.registry import check
 
 from ...reconstruct.exploration_of_cylinder import HEIGHT, RADIUS, Frame, explore_cylinder
 
@@ -54,6 +55,27 @@ def test_a_recording_says_what_is_wrong_with_its_segments(explored):
         dataclasses.replace(recording, segments=(Stretch("press", 2.0, 1.0),))
     with pytest.raises(RecordingError, match="order of time"):
         split(dataclasses.replace(recording, segments=recording.segments[::-1]))
+
+
+def test_a_foot_traced_in_two_sessions_is_one_tracing_and_its_file_says_how_to_go_on(tmp_path):
+    """A session that was closed meanwhile was lost; its file was called drifting."""
+    recording, _ = explore_cylinder()
+    start, end = recording.boundary_phase
+    first, last = np.searchsorted(recording.t, [max(start - 0.3, 0.0), end + 0.3])
+    middle = int(first + 0.6 * (last - first))
+
+    def piece(a, b):
+        return Segment("trace", recording.t[a:b], recording.position[a:b], recording.force_on_tool[a:b])
+
+    explorer = Explorer(Instrument(recording.tip_radius_m, recording.sample_rate_hz))
+    explorer.add(piece(first, middle))
+    assert explorer.suggest().kind == "trace"
+    path = explorer.save(tmp_path / "part.csv.gz")
+    (finding,) = check(read_recording(path))
+    assert finding.grave and f"palpate explore --device mouse --continue {path}" in finding.todo
+    explorer = Explorer.going_on(read_recording(path))
+    explorer.add(piece(middle - 100, last))
+    assert explorer.suggest().kind == "press"
 
 
 @pytest.mark.slow

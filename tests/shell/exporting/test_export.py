@@ -270,6 +270,26 @@ def test_mujocos_tip_is_pressed_by_the_line_that_is_printed(tmp_path):
     assert force_on_tip(mujoco, model, data)[2] > 0.01
 
 
+def test_how_far_a_flex_is_off_under_a_deep_press_is_told(tmp_path):
+    """Pressed as deep as `palpate press` does it read a quarter of its force, and no number was said."""
+    mujoco = pytest.importorskip("mujoco")
+    path, model = tmp_path / "m.xml", block(nu=0.45, ball=False)
+    notes = pp.export(model, "mujoco", path, at=(0, 0, 0.03), progress=False)
+    (told,) = (
+        found for each in notes if (found := re.search(r"([\d.]+) mm deep .* (\d+) mN .* (\d+) mN", each))
+    )
+    depth_m, theirs, ours = (1e-3 * float(value) for value in told.groups())
+    curve = pp.press(model, at=(0, 0, 0.05), depth_m=depth_m, progress=False)
+    assert ours == pytest.approx(curve.peak_force_n, rel=0.05)
+    scene = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(scene)
+    mujoco.mj_forward(scene, data)
+    data.ctrl[:] = np.array([0, 0, 0.035 - depth_m]) - data.body("tip").xpos
+    for _ in range(300):
+        mujoco.mj_step(scene, data)
+    assert theirs == pytest.approx(force_on_tip(mujoco, scene, data)[2], rel=0.15) and theirs < 0.8 * ours
+
+
 def test_mujocos_file_gives_the_force_that_is_replayed(tmp_path):
     """The file, loaded and stepped by MuJoCo alone with its tip led by hand, against the renderer on the same
     path: down and aside, with a Poisson's ratio that a flex does not bear, a friction that never slips and a

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from types import SimpleNamespace
 
 import numpy as np
@@ -43,8 +45,9 @@ def swept(monkeypatch, tmp_path):
 def test_what_is_said_to_go_on_does(swept, capsys):
     assert swept() == 130
     said = capsys.readouterr().out
-    assert "kept in mine.csv.gz" in said and "the same command with --continue mine.csv.gz" in said
-    assert swept("--continue", "mine.csv.gz") == 130
+    assert "kept in mine.csv.gz" in said
+    (command,) = re.findall(r"go on: palpate (explore .*--continue .*)", said)
+    assert cli.main(shlex.split(command)) == 130
     assert "replaced" not in capsys.readouterr().err, "it holds all that it held"
     assert [s.kind for s in read_recording("mine.csv.gz").segments] == ["trace", "trace"]
 
@@ -53,7 +56,9 @@ def test_a_recording_that_is_there_is_said_to_be_replaced(swept, capsys):
     swept()
     assert "is there" not in capsys.readouterr().err
     swept()
-    assert "mine.csv.gz is there, and is replaced" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "mine.csv.gz is there, and is replaced" in said
+    assert "`palpate explore --phantom dome --output mine.csv.gz --continue mine.csv.gz`" in said
 
 
 def test_a_recording_of_other_origin_is_not_replaced_by_what_goes_on_with_it(swept, capsys):
@@ -75,7 +80,7 @@ def test_where_nothing_was_taken_in_nothing_is_to_be_continued(monkeypatch, caps
         made = SimpleNamespace(material=SimpleNamespace(poisson_ratio=0.49))
         guide(SimpleNamespace(servo=servo, model=made, title="dome", worker=None))
 
-    monkeypatch.setattr("palpate.window.guide.Guide", lambda *given: None)
+    monkeypatch.setattr("palpate.window.guide.Guide", lambda *given: SimpleNamespace(keep_tracing=int))
     monkeypatch.setattr("palpate.operations.touch.touch", touched)
     monkeypatch.setattr("palpate.show.scenery.no_screen", lambda: "")
     assert cli.main(["explore", "--device", "mouse", "-o", str(tmp_path / "mine.csv.gz")]) == 0

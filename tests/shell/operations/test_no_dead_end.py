@@ -318,7 +318,7 @@ def test_what_does_not_predict_is_kept_before_it_is_looked_into(tmp_path, monkey
 def test_a_shape_whose_model_does_not_predict_is_tried_another_way_up():
     """Upside down it said 42 kPa for 17, and nothing of --up."""
     result = SimpleNamespace(
-        placed=SimpleNamespace(doubt="", about={"file": "part.stl"}),
+        placed=SimpleNamespace(doubt="", likelier_radius_m=None, about={"file": "part.stl"}),
         doubt="a 1D model predicts better",
         held_out=None,
         model=SimpleNamespace(
@@ -329,6 +329,11 @@ def test_a_shape_whose_model_does_not_predict_is_tried_another_way_up():
     words = open_words({"files": ("REC.csv",), "shape": "part.stl", "unit": "mm"}, way.options)
     parsed = parser_of("open").parse_args(shlex.split(words)[2:])
     assert parsed.up == "-z" and parsed.shape == "part.stl"
+    result.placed.doubt, result.placed.likelier_radius_m = "the tip's radius may not be 6.2 mm", 0.0031
+    (way,) = mending(result)
+    words = open_words({"files": ("REC.csv",), "shape": "part.stl", "tip_radius_m": 0.0062}, way.options)
+    parsed = parser_of("open").parse_args(shlex.split(words)[2:])
+    assert parsed.tip_radius_m == pytest.approx(0.0031) and parsed.shape == "part.stl"
 
 
 def test_a_geometry_that_is_named_takes_the_place_of_force():

@@ -47,6 +47,7 @@ def test_what_one_modulus_leaves_is_the_presses_error_on_the_page():
     twice = dataclasses.replace(recording, force_on_tool=recording.force_on_tool * half)
     made = pp.reconstruct(twice, half_space=True, progress=False)
     (error,) = (c for c in view_of_made(made).colourings if "force error" in c.title)
+    assert error.title == "force error, first touches as recorded"
     said = float(re.search(r"off by ([\d.]+) mN", meaning(made))[1])
     assert said == pytest.approx(1e3 * np.sqrt((error.presses**2).mean()), rel=0.02)
     felt = np.linalg.norm(twice.force_on_tool, axis=1).max()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.diagnosis.explore.explorer import Suggestion
+from palpate.diagnosis.explore.segments import Segment
 from palpate.servo.layout import ROW
 from palpate.window import guide as module
 from palpate.window.guide import Guide
@@ -102,6 +103,28 @@ def test_a_touch_that_is_not_at_the_foot_is_said_not_to_count(guided):
     tracing.share = 0.6
     _frames(guide, servo, (0.5, 0.7), (0.6, 0.0))
     assert "does not count" not in guide.lines()[0]
+
+
+def test_a_session_that_is_closed_while_the_foot_is_traced_keeps_what_was_traced(guided):
+    guide, servo, explorer, tracing = guided
+    _frames(guide, servo, (0.3, 0.0), (0.5, 0.7))
+    guide.keep_tracing()
+    assert explorer.segments == [], "it was nowhere at the foot"
+    tracing.share = 0.76
+    _frames(guide, servo, (0.5, 0.7))
+    guide.keep_tracing()
+    assert [s.kind for s in explorer.segments] == ["trace"] and explorer.saved == 1
+
+
+def test_what_was_traced_before_counts_where_a_session_goes_on(guided):
+    guide, servo, explorer, tracing = guided
+    seen = []
+    tracing.add = lambda tips, numbers: seen.append(len(tips))
+    t = np.arange(600) / RATE
+    explorer.segments.append(Segment("trace", t, np.zeros((600, 3)), np.zeros((600, 3))))
+    explorer.tracings = 2
+    Guide(explorer, servo, guide._model, guide._worker, guide._path)
+    assert seen == [600]
 
 
 def test_what_follows_a_tracing_that_was_not_understood_goes_on_with_it(guided):
