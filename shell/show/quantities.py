@@ -39,13 +39,9 @@ class ShownQuantity:
 
 ORDER = ShownQuantity("first touches, in order", "", 1.0, "plasma")
 DEPTH = ShownQuantity("greatest depth", "mm", 1e3, "YlGnBu")
-<<<<<<< HEAD
 ERROR = ShownQuantity("force error", "mN", 1e3, "YlOrRd")
-=======
-ERROR = ShownQuantity("force error", "mN", 1e3, "magma_r")
 AS_RECORDED, FITTED = (f"{ERROR.name}, first touches {how}" for how in ("as recorded", "fitted"))
 """Of one press the two may be 96 and 20 mN: what a first touch that was found late costs is in the first."""
->>>>>>> walk6sight
 STIFFNESS = ShownQuantity("own stiffness", "N/m", 1.0, "viridis")
 KELVIN_VOIGT = ShownQuantity("stiffness k_V of a press", "N/m", 1.0, "viridis")
 MODULUS = ShownQuantity("modulus", "kPa", 1e-3, "cividis", least_share=0.5)
