@@ -102,7 +102,8 @@ def sure_picks(opened: dict[str, Any]) -> list[bool]:
     verdict = opened["verdict"]
     picks = [p for p in verdict.get("picked", ())[:1] if p in verdict["scores"]]
     true = {_phenomenon(name) for name in opened["case"]["tested"]}
-    sure = [p for p in picks if WEIGHTS.log_odds(verdict["scores"][p][0], effect(p).scope) > SURE]
+    odds = {p: WEIGHTS.log_odds(verdict["scores"][p][0], WEIGHTS.border_of(effect(p).scope)) for p in picks}
+    sure = [p for p in picks if odds[p] > SURE]
     return [_phenomenon(p) not in true for p in sure]
 
 

@@ -14,7 +14,7 @@ from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.search.descent import Descent, first_touches, fit
 from palpate.diagnosis.search.fit import Fit, settings_of
 from palpate.diagnosis.search.leave_one_out import JudgedSet, held_out
-from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.naming import WEIGHTS, Score
 from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.settings import ForwardSettings
@@ -114,7 +114,7 @@ class Search:
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
         return Score(
             tuple(added), float(gain / over), size, size / t.force_rms_n, float(foretold / over),
-            per_group / over, new,
+            per_group / over, new, WEIGHTS.border_of(added[0].scope, measured=self.forward.measured),
         )  # fmt: skip
 
     def able(self, score: Score, *, first: bool = True) -> bool:

@@ -155,7 +155,9 @@ class Patterns:
         evidence = gain - (np.log(groups) if lump else np.maximum(per_group.max(axis=1), 0.0))
         evidence = np.minimum(evidence, new.amplitude**2 * self.beyond[column - 1])
         foretold = (each if lump else np.where(predicted, 0.5 * (old.held - new.held), 0.0)).sum(axis=1)
-        odds = WEIGHTS.log_odds(evidence, effect.scope)
+        odds = WEIGHTS.log_odds(
+            evidence, WEIGHTS.border_of(effect.scope, measured=self.search.forward.measured)
+        )
         return Linear((foretold > 0) & (expit(odds) > options.sure), odds, gain)
 
 

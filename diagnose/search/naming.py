@@ -26,17 +26,24 @@ from palpate.mechanics.law_errors import Unnamed
 @dataclass(frozen=True)
 class Weights:
     """Log odds = evidence * log10(gain in log likelihood over that of the border). border: of what acts in
-    space; in_time: of what has a loop, which the noise of every sample tells, and slow noise imitates. lapse:
-    the share of the surest answers in which something else was there."""
+    space; in_time: of what has a loop, which the noise of every sample tells, and slow noise imitates;
+    simulated: of another simulator's force, which has none. lapse: the share of the surest answers in which
+    something else was there."""
 
     border: float
     in_time: float
+    simulated: float
     evidence: float
     lapse: float
 
-    def log_odds(self, gain: ArrayLike, scope: Scope) -> np.ndarray:
-        """(...) that an effect of a scope is there. gain: log likelihood."""
-        border = self.in_time if scope is Scope.TIME else self.border
+    def border_of(self, scope: Scope, *, measured: bool = True) -> float:
+        """The gain from which an effect of a scope is likelier there than not."""
+        if not measured:
+            return self.simulated
+        return self.in_time if scope is Scope.TIME else self.border
+
+    def log_odds(self, gain: ArrayLike, border: float) -> np.ndarray:
+        """(...) that an effect is there. gain: log likelihood."""
         return np.asarray(self.evidence * np.log10(np.maximum(gain, 1.0) / border))
 
 
@@ -67,6 +74,7 @@ class Score:
     added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
     per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N;
     share: the same over the force.
+    border: the evidence from which it is likelier there than not.
     foretold: log likelihood gained at places that the fit has not seen, all in all; of a lump as fitted, 0
     where the plain squares do not shrink.
     """
@@ -78,6 +86,7 @@ class Score:
     foretold: float
     per_group: np.ndarray
     candidate: JudgedSet
+    border: float
 
     @property
     def effect(self) -> Effect:
@@ -107,7 +116,7 @@ class Score:
     @property
     def log_odds(self) -> float:
         """That it is there, rather than an error of our own law."""
-        return float(WEIGHTS.log_odds(self.evidence, self.effect.scope))
+        return float(WEIGHTS.log_odds(self.evidence, self.border))
 
     @property
     def probability(self) -> float:

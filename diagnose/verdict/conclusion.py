@@ -233,7 +233,7 @@ def entries_of(findings: Findings, answer: Answer, gaps: Gaps, counts: np.ndarra
         )  # fmt: skip
     for rest in (effect(n) for n in answer.names if effect(n).role is Role.REST):
         left = gap(found.final.plain, counts, added)
-        there = (1 - WEIGHTS.lapse) * float(expit(WEIGHTS.log_odds(answer.shape_gain, rest.scope)))
+        there = (1 - WEIGHTS.lapse) * float(expit(WEIGHTS.log_odds(answer.shape_gain, WEIGHTS.border)))
         entries.append(EffectEntry(rest.name, rest.domain, there, left, 0.0, None, {}))
     entries = [dataclasses.replace(e, intervals=widened(e.name, e.parameters, e.intervals)) for e in entries]
     place = {n: i for i, n in enumerate(answer.names)}

@@ -9,7 +9,8 @@ from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.search.attribution import _told_apart, _with_strain, _without_idle
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.gaps import lower_closure
-from palpate.diagnosis.search.naming import Score
+from palpate.diagnosis.search.leave_one_out import JudgedSet
+from palpate.diagnosis.search.naming import WEIGHTS, Score
 from palpate.diagnosis.search.rivals import Choice
 from palpate.mechanics.effects.registry import effect
 
@@ -19,6 +20,7 @@ def score(name, per_group, foretold=9.0, values=(0.02,), share=0.02):
     return Score(
         (effect(name),), gain=gains.sum(), size_n=0.014, share=share, foretold=foretold, per_group=gains,
         candidate=SimpleNamespace(chi=0.85, found=SimpleNamespace(of=lambda name: np.array(values))),
+        border=WEIGHTS.border_of(effect(name).scope),
     )  # fmt: skip
 
 
@@ -33,6 +35,22 @@ def search():
 def test_one_site_does_not_name_what_every_site_feels(search, name):
     assert not search.passes(score(name, [410.0] + [0.1] * 39))
     assert search.passes(score(name, [12.0, 8.0, 20.0, 16.0] * 10))
+
+
+def test_a_loop_needs_more_than_what_acts_in_space(search):
+    """Slow noise imitates it: sound cases show up to 83 nats of a delay, true ones 275 and more."""
+    assert search.passes(score("tip_radius", [2.0] * 40))
+    assert not search.passes(score("time_delay", [2.0] * 40)) and search.passes(
+        score("time_delay", [5.0] * 40)
+    )
+
+
+def test_places_that_scatter_less_than_said_tell_more():
+    def over(places, chi):
+        return JudgedSet(None, np.zeros(places), np.zeros(places), np.full(places, 0.8), places, chi).over
+
+    assert over(10, 2.0) == 2.0 and over(10, 1.0) == 1.0
+    assert over(1000, 0.2) < over(10, 0.2) == pytest.approx(0.6)
 
 
 def test_one_site_may_name_a_lump(search):
