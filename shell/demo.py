@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 class DemoOptions:
     """What a person may want otherwise."""
 
-    seconds: float = option(4.0, "how long the 1 kHz loop runs against the simulated hand", unit="s")
+    seconds: float = option(3.0, "how long the 1 kHz loop runs against the simulated hand", unit="s")
     renderer: str = option("fem", "which renderer serves the loop and the replay")
     diagnosis: bool = option(True, "diagnose the gap too", flag="--diagnosis")
     fast: bool = option(True, "by fewer effects")
