@@ -45,8 +45,9 @@ def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     places, skin = scene.places, Skin(**_report(values, scene, settings.modulus))
     _set(settings.touch, skin, places.model)
-    local = 1 - patch_softness(energy_fields(places).width_m, skin, places.model.material.poisson_ratio)
-    settings.far = settings.far + _stretched(skin, places) + local * energy_fields(places).half_space
+    fields = energy_fields(places)
+    local = 1 - patch_softness(fields.width_m, skin, places.model.material.poisson_ratio)
+    settings.far = settings.far + _stretched(skin, places) + local * fields.half_space
 
 
 def _stretched(skin: Skin, places: Places) -> np.ndarray:
