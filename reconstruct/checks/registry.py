@@ -13,6 +13,7 @@ import numpy as np
 from palpate.mechanics.errors import ContactError, FewPressesError, NoBaseError, RecordingError
 from palpate.mechanics.plausible import EXPLORATION
 from palpate.mechanics.recording.recording import Recording
+from palpate.mechanics.recording.segments import within
 from palpate.reconstruction.checks.air import air, delay, sloping, slow
 from palpate.reconstruction.checks.channels import channels
 from palpate.reconstruction.checks.clock import clock
@@ -78,7 +79,7 @@ def checked_samples(
         return CheckedSamples()
     if len(recording.t) < _LEAST_SAMPLES:
         return CheckedSamples((_too_short(recording),) if by_hand else ())
-    if by_hand and how_to_go_on(recording) and all(each.kind != "press" for each in recording.segments):
+    if by_hand and _only_prepared(recording):
         return CheckedSamples((_without_presses(recording),))
     if not by_hand:
         data = Samples(recording, cutoff_hz=cutoff_hz)
@@ -239,6 +240,16 @@ def _too_short(recording: Recording) -> Finding:
         (float(recording.t[0]), float(recording.t[-1])),
         ways=OF_A_KNOWN_OBJECT,
     )
+
+
+def _only_prepared(recording: Recording) -> bool:
+    """Whether an exploration ended before its first press: its segments hold every sample, none of a press.
+    Of another recording they name what lies beside its presses."""
+    kinds = {each.kind for each in recording.segments}
+    if not how_to_go_on(recording) or "press" in kinds:
+        return False
+    held = np.any([within(recording.segments, kind, recording.t) for kind in kinds], axis=0)
+    return bool(held[1:-1].all())  # the ends are rounded
 
 
 def _without_presses(recording: Recording) -> Finding:

@@ -96,3 +96,11 @@ def test_an_untraced_object_of_a_stated_shape_is_explored_on(tmp_path, monkeypat
     (tmp_path / "more").mkdir()
     again = Explorer.going_on(read_recording(explorer.save("more/more.csv.gz")))
     assert again.state.surface == "known shape" and again.state.presses == len(onsets)
+
+
+def test_a_recording_that_names_what_lies_beside_its_presses_is_no_exploration_without_one(tmp_path):
+    """Two tracings and presses, only the tracings named: 'it ended before anything was pressed' was said."""
+    recording, _ = explore_cylinder()
+    beside = (Stretch("trace", *recording.boundary_phase),)
+    path = write_recording(tmp_path / "two.csv", dataclasses.replace(recording, segments=beside))
+    assert all(finding.name != "no presses" for finding in check(read_recording(path)))
