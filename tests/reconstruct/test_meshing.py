@@ -206,7 +206,20 @@ def test_no_label_is_lost_where_a_line_meets_an_edge():
     )
 
 
-def test_a_mesher_that_hangs_is_tried_again_with_one_thread_on_a_simplified_drawing(monkeypatch):
+def test_a_drawing_is_meshed_alike_each_time_it_is_asked_for(monkeypatch, tmp_path):
+    monkeypatch.setenv("PALPATE_CACHE", str(tmp_path))
+    ball = trimesh.creation.icosphere(3, radius=0.03)
+    given = {"edge_m": 0.01, "envelope_m": 0.0005, "simplify": False}
+    points, cells = tetrahedralize(ball.vertices, ball.faces, **given)
+    again, same = tetrahedralize(ball.vertices, ball.faces, **given, threads=1)
+    np.testing.assert_array_equal(again, points)
+    np.testing.assert_array_equal(same, cells)
+    other, _ = tetrahedralize(ball.vertices, ball.faces, **given, take=1)
+    assert other.shape != points.shape or not np.allclose(other, points)
+
+
+def test_a_mesher_that_hangs_is_tried_again_with_one_thread_on_a_simplified_drawing(monkeypatch, tmp_path):
+    monkeypatch.setenv("PALPATE_CACHE", str(tmp_path))
     ended, asked = tetwild._ended, []
 
     def stuck_at_first(folder, limit_s):

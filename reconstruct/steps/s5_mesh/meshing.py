@@ -92,9 +92,10 @@ def fill(surface: Surface, options: MeshingOptions | None = None, progress: Prog
         raise MeshError(f"the surface ends {1e3 * lowest:.2f} mm above the support; it must stand on it")
     mesher = prepared(surface, options)
     made: list[tuple[float, TetMesh]] = []
-    for rest in reversed(range(_TRIES)):
+    for take in range(_TRIES):
+        rest = _TRIES - 1 - take
         progress("meshing", 0.8 * (1 - (rest + 1) / _TRIES))
-        points, cells = mesher.fill()
+        points, cells = mesher.fill(take)
         # a tetrahedron may be flattened, or beyond what relaxing mends; the mesher's next mesh is another
         try:
             mesh = _standing(points, cells, surface, mesher.envelope_m, options.radius_edge_ratio)

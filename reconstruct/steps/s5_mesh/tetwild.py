@@ -13,11 +13,15 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
 from palpate.mechanics.disk.reading import reading
+from palpate.mechanics.disk.scratch import cache_folder
+from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.disk.writing import temporary_folder
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.shape.tetmesh import tet_volumes
@@ -71,16 +75,45 @@ def tetrahedralize(
     simplify: bool = True,
     threads: int | None = None,
     passes: int = _PASSES,
+    take: int = 0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, of the solid inside a closed surface.
+
+    fTetWild shuffles by a seed that nobody can set (its issue 72), so what was meshed once is kept in the
+    cache: the same drawing gives the same tetrahedra.
 
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
     simplify: merge triangles within the envelope first; a drawing as coarse as the tetrahedra needs none,
     and comes out better in half the time. threads: None takes OMP_NUM_THREADS, without it all cores. passes:
-    of optimisation at most; few where their surface alone is wanted. Raises
-    MeshError where nothing comes back, MeshTooDear where that is for the size.
+    of optimisation at most; few where their surface alone is wanted. take: another one is another mesh of the
+    same drawing. Raises MeshError where nothing comes back, MeshTooDear where that is for the size.
     """
     check_count(vertices, triangles, edge_m)
+    key = content_key(
+        "tetrahedra 1",
+        version("pytetwild"),
+        vertices,
+        triangles,
+        edge_m,
+        envelope_m,
+        simplify,
+        passes,
+        take,
+    )
+    mesh = partial(_meshed, vertices, triangles, edge_m, envelope_m, simplify, threads, passes)
+    kept = load_or_build(cache_folder() / "tetrahedra" / f"{key[:24]}.bin", key, mesh)
+    return np.array(kept["points"]), np.array(kept["cells"])
+
+
+def _meshed(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    edge_m: float,
+    envelope_m: float,
+    simplify: bool,
+    threads: int | None,
+    passes: int,
+) -> dict[str, np.ndarray]:
     work_s = _WORK_S + _WORK_PER_TETRAHEDRON_S * tetrahedra(vertices, triangles, edge_m)
     if threads is None:
         threads = int(os.environ.get("OMP_NUM_THREADS", "").split(",")[0] or 0)
@@ -118,7 +151,7 @@ def tetrahedralize(
         raise MeshError(f"the mesher gave no tetrahedra: --mesh-size {edge_m} m does not fit the object")
     turned = tet_volumes(points, cells) < 0
     cells[turned] = cells[turned][:, [0, 2, 1, 3]]
-    return points, cells
+    return {"points": points, "cells": cells}
 
 
 def _ended(folder: Path, limit_s: float) -> int | None:
