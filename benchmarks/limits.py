@@ -119,8 +119,10 @@ def _named(
     columns = nuisance_columns(
         found.forward, settings, force.copy(), found.search.nuisance, found.site_sd, whitener.onset_sd
     )
+    scatter = np.sqrt(found.found.base.over)  # of places, as this recording's do
     for level, column in columns[1:]:  # the first is the first touch's
         drawn = rng.normal(size=len(t))[t.press if level == "press" else t.site[t.press]]
+        drawn = drawn if level == "press" else scatter * drawn
         force += drawn[:, None] * column
     force += _noise(t, whitener, rng)
     forward = copy.copy(found.forward)

@@ -40,7 +40,7 @@ def lagrange(x: float) -> tuple[np.ndarray, np.ndarray]:
 class Grading:
     """How far a body goes, in tip radii, and by how much elements grow, along the surface and down."""
 
-    extent: float = 10_000.0
+    extent: float = 400.0
     along: float = 1.18
     down: float = 1.12
 

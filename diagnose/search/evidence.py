@@ -95,7 +95,7 @@ class Search:
         """Compare a candidate with the one that lacks `added`."""
         extra = len(new.found.values) - len(old.found.values)
         between = all(e.scope.between_places for e in added)
-        over = new.over if between else max(1.0, new.chi)
+        over = new.over_of(between_places=between)
         fitted = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
         # predicted with what the other places alone would have added: a lump under one place is none
         predicted = (fitted.sum() - fitted) / over > extra

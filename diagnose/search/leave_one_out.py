@@ -36,11 +36,15 @@ class JudgedSet:
 
     @property
     def over(self) -> float:
-        """What gains by what differs from place to place are divided by: the set's own lack of fit. Where the
+        """Of what differs from place to place: the set's own lack of fit. Where the
         places scatter less than our own errors are said to be, these are as small as so many places tell."""
         places = len(self.held)
         told = (STATED + places * self.place_chi) / (STATED + places)
         return max(told, self.place_chi, self.chi if self.chi > 1 else 0.0)
+
+    def over_of(self, *, between_places: bool) -> float:
+        """What the gains of an effect are divided by that differs from place to place, or that acts in time."""
+        return self.over if between_places else max(1.0, self.chi)
 
     @property
     def residual(self) -> np.ndarray:

@@ -1,6 +1,6 @@
 """From which size on an effect is named in these presses: the promise that "none" makes.
 
-Residuals are drawn from the covariance of the comparison, an effect's own change of the force is added, and
+Residuals are drawn from the covariance of the comparison, as wide as the places of this recording scatter, an effect's own change of the force is added, and
 the rule of `naming` is asked, all by linear algebra about the fit without effects: what each candidate gains
 and foretells of places left out follows from inner products. A first touch that the surface was fitted to
 takes along what shows by it.
@@ -67,6 +67,7 @@ class Patterns:
         seed: int,
     ) -> None:
         self.search, self.effects = search, effects
+        self.over = [base.over_of(between_places=e.scope.between_places) for e in effects]
         forward, found, whitener = search.forward, base.found, search.whitener
         counted = forward.touches.counted
         settings = settings_of(forward, found.effects, found.values, found.onset)
@@ -117,10 +118,12 @@ class Patterns:
 
     def named(self, number: int, true: np.ndarray, size_n: np.ndarray) -> np.ndarray:
         """(d,) whether each draw names the effect that stands in it by form true (d,), size_n (d,) N."""
-        factor = size_n / self.size[true]
+        # draws are of the stated widths, and count by those; places that scatter less show what is smaller
+        over = self.over[number]
+        factor = size_n / self.size[true] / np.sqrt(over)
         white = self.white.with_column(1 + true, factor)
         gains = white.gains()
-        mine = self.scored(number, white, gains)
+        mine = self.scored(number, white, gains, over)
         rest = np.array([gains[:, self.own == k].max(axis=1, initial=0.0) for k in range(len(self.effects))])
         near = (rest > CLOSE * rest[number]).any(axis=1)
         named = mine.passes.copy()
@@ -128,7 +131,7 @@ class Patterns:
         others = []
         for k in np.flatnonzero(near).tolist():
             if k != number and not of_one_phenomenon(self.effects[k], [self.effects[number]]):
-                other = self.scored(k, white, gains)
+                other = self.scored(k, white, gains, over)
                 others.append(other)
                 best = np.where(other.passes, np.maximum(best, other.odds), best)
         doubt = self.search.options.beyond_doubt
@@ -137,8 +140,9 @@ class Patterns:
             named &= ~(other.passes & (other.odds > best - doubt) & (other.gain > most))
         return named
 
-    def scored(self, number: int, white: Products, gains: np.ndarray) -> Linear:
-        """The score of an effect's likeliest form in each draw, as `Search.score` has it."""
+    def scored(self, number: int, white: Products, gains: np.ndarray, over: float = 1.0) -> Linear:
+        """The score of an effect's likeliest form in each draw, as `Search.score` has it. over: of a draw's
+        own squares, what they stand for."""
         effect, options = self.effects[number], self.search.options
         forms = np.flatnonzero(self.own == number)
         column = 1 + forms[np.argmax(gains[:, forms], axis=1)]
@@ -153,7 +157,7 @@ class Patterns:
             gain = each.sum(axis=1) - 0.5 * np.log(groups) * extra
         lump = effect.hints.few_places
         evidence = gain - (np.log(groups) if lump else np.maximum(per_group.max(axis=1), 0.0))
-        evidence = np.minimum(evidence, new.amplitude**2 * self.beyond[column - 1])
+        evidence = np.minimum(evidence, over * new.amplitude**2 * self.beyond[column - 1])
         foretold = (each if lump else np.where(predicted, 0.5 * (old.held - new.held), 0.0)).sum(axis=1)
         odds = WEIGHTS.log_odds(
             evidence, WEIGHTS.border_of(effect.scope, measured=self.search.forward.measured)

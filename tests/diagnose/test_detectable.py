@@ -87,9 +87,22 @@ def test_a_spring_in_the_tool_hides_behind_modulus_and_first_touch_as_a_delay_do
     """A delay by a clock that is known, for what hides; by one that is not, its limit is the clock's."""
     delay = effect("time_delay")
     known = dataclasses.replace(delay, hints=dataclasses.replace(delay.hints, untold=()))
-    limits = detectable(*judged, [known, effect("tip_radius"), effect("tool_compliance")])
+    search, base = judged
+    base = dataclasses.replace(base, place_chi=1.0)  # places that scatter as is said of them
+    limits = detectable(search, base, [known, effect("tip_radius"), effect("tool_compliance")])
     assert limits["time_delay"] < 0.7 * min(limits["tip_radius"], limits["tool_compliance"])
     assert detectable(*judged, [delay])["time_delay"] > 1.2 * limits["time_delay"]
+
+
+def test_places_that_scatter_less_than_is_said_show_what_is_smaller(judged):
+    """As the rule of naming counts by their scatter; what acts in time is told by noise."""
+    search, base = judged
+    tried = [effect("compliant_base"), effect("time_delay")]
+    wide, narrow = (
+        detectable(search, dataclasses.replace(base, place_chi=places), tried) for places in (1.0, 0.1)
+    )
+    assert narrow["compliant_base"] < 0.8 * wide["compliant_base"] < np.inf
+    assert narrow["time_delay"] == wide["time_delay"]
 
 
 def test_an_effect_that_starts_from_nothing_has_a_limit_as_well(judged):
