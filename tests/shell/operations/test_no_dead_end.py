@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 import shlex
 from dataclasses import replace
@@ -135,7 +136,8 @@ def reached(monkeypatch) -> type[Exception]:
     def reconstruct(*_, **__):
         raise Reached
 
-    monkeypatch.setattr("palpate.operations.reconstruct.reconstruct", reconstruct)
+    importlib.import_module("palpate.diagnosis.compare.comparison")  # keeps what it is imported with
+    monkeypatch.setattr("palpate.reconstruction.pipeline.reconstruct_fully", reconstruct)
     return Reached
 
 
