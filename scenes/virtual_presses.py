@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from palpate.devices.intention import HandPath
+from palpate.devices.virtual_hand import LONGEST_CATCH_UP_S
 from palpate.mechanics.compliance.near_field import surface_softness
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.compliance.sites import LoadPatch, touch_sites, touch_solver
@@ -138,6 +139,9 @@ def spread_places(model: Model, count: int, *, clearance_m: float = CLEARANCE_M)
 
 
 ANGLES = 180
+UNFELT_S = 2 * LONGEST_CATCH_UP_S
+"""In free air at first: so far a hand may have gone when the loop that it feels begins, late before its first
+pose and once more after it."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +179,7 @@ def explore(
     out = trace[0] - trace.mean(axis=0)
     beside = trace[0] + options.clearance_m * out / np.linalg.norm(out)
     times, points = [0.0], [beside + 0.03 * model.support.normal]
+    _rest(times, points, UNFELT_S)
     _go(times, points, beside, options.travel_speed_m_per_s)
     _go(times, points, trace[0], options.tracing_speed_m_per_s)
     for point in trace[1:]:

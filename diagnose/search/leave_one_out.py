@@ -43,7 +43,7 @@ class JudgedSet:
         return max(told, self.place_chi, self.chi if self.chi > 1 else 0.0)
 
     def over_of(self, *, between_places: bool) -> float:
-        """What the gains of an effect are divided by that differs from place to place, or that acts in time."""
+        """By what gains are divided: of an effect that differs from place to place, or acts in time."""
         return self.over if between_places else max(1.0, self.chi)
 
     @property

@@ -1,9 +1,9 @@
 """From which size on an effect is named in these presses: the promise that "none" makes.
 
-Residuals are drawn from the covariance of the comparison, as wide as the places of this recording scatter, an effect's own change of the force is added, and
-the rule of `naming` is asked, all by linear algebra about the fit without effects: what each candidate gains
-and foretells of places left out follows from inner products. A first touch that the surface was fitted to
-takes along what shows by it.
+Residuals are drawn from the covariance of the comparison, as wide as the places of this recording scatter, an
+effect's own change of the force is added, and the rule of `naming` is asked, all by linear algebra about the
+fit without effects: what each candidate gains and foretells of places left out follows from inner products. A
+first touch that the surface was fitted to takes along what shows by it.
 """
 
 from __future__ import annotations

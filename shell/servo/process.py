@@ -32,7 +32,7 @@ from palpate.render.passivity import passivity_parameters
 from palpate.render.scene import TouchScene, in_the_air, scene_of
 from palpate.servo.clock import lock_memory, quiet_interpreter, real_time_thread
 from palpate.servo.device_thread import DeviceThread
-from palpate.servo.layout import ENABLE, MOST_TIPS, ROW, STOP, SharedArrays, SharedBlock
+from palpate.servo.layout import ENABLE, MOST_TIPS, ROW, STOP, TICKS, SharedArrays, SharedBlock
 from palpate.servo.loop import Program, ServoLoop, make_program
 from palpate.servo.options import ServoOptions
 from palpate.servo.source import RendererSource
@@ -44,7 +44,7 @@ GO = "go"
 STEPS_IN = 30
 """Ticks in which a press that is under way is made again by another renderer."""
 LOOK_S = 0.1
-_BLENDED_S, _LOOK_BLEND_S = 2.0, 5e-3
+_BLENDED_S, _LOOK_BLEND_S, _LOOK_FIRST_S = 2.0, 5e-3, 1e-3
 """How long one table is left for the next at most, and how often that is looked at."""
 GRACE_S = 0.7
 
@@ -179,6 +179,8 @@ class ServoProcess:
         self._pump = pump
         pump.prepare()
         self._loop.start()
+        while not self._arrays.shared.counts[TICKS] and not self._loop.join(_LOOK_FIRST_S):
+            pass  # a hand that moved before the loop felt it would begin inside the object
         pump.start()
         self._tell({"ready": True, "tip_radius_m": float(program.state.radii_m[0])})
         try:
