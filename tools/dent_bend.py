@@ -13,12 +13,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from pypardiso import PyPardisoSolver
 
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.contact.dent import dent_law, effective_radius, grid
 from palpate.mechanics.disk.writing import atomic_file
-from tools.dent_half_space import COARSE, Grading, HalfSpace, lagrange, rule
+from tools.dent_half_space import COARSE, Grading, HalfSpace, lagrange, rule, solved
 from tools.dent_table import Press
 from tools.script import script
 
@@ -71,7 +70,7 @@ def patch_far(body: HalfSpace, width: float, poisson_ratio: float) -> float:
     load, moved = np.zeros(body.fixed.size), np.zeros(body.fixed.size)
     load[1::2] = -weights
     tangent = body.forces(np.zeros_like(body.points))[1]
-    moved[free] = PyPardisoSolver().solve(tangent[free][:, free].tocsr(), load[free])
+    moved[free] = solved(tangent[free][:, free].tocsr(), load[free])
     half = half_space_compliance(np.array([1.0, 0.0, 0.0]), poisson_ratio, width)[0, 0]
     return float(-weights @ moved[1::2]) - half
 

@@ -15,11 +15,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from pypardiso import PyPardisoSolver
 
 from palpate.mechanics.contact.dent import dent_law, grid
 from palpate.mechanics.disk.writing import atomic_file
-from tools.dent_half_space import COARSE, FINE, Grading, HalfSpace
+from tools.dent_half_space import COARSE, FINE, Grading, HalfSpace, solved
 from tools.script import script
 
 
@@ -44,7 +43,6 @@ class Press:
     """The sphere's way down: which rings of the surface stick, and where on the sphere."""
 
     def __init__(self, body: HalfSpace) -> None:
-        self.solver = PyPardisoSolver()
         self.body = body
         self.u = np.zeros_like(body.points)
         self.stuck = 1
@@ -68,7 +66,7 @@ class Press:
             force, tangent = body.forces(u)
             right = -(force + tangent @ change)[free] if iteration == 0 else -force[free]
             step = change.copy() if iteration == 0 else np.zeros(u.size)
-            step[free] = self.solver.solve(tangent[free][:, free].tocsr(), right)
+            step[free] = solved(tangent[free][:, free].tocsr(), right)
             u = u + step.reshape(u.shape)
             if np.abs(step).max() < 1e-9:
                 break
