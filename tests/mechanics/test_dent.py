@@ -46,7 +46,7 @@ def test_sphere_table_is_sneddon():
 @pytest.mark.parametrize("name", dent_laws())
 def test_stiffness_is_the_slope_of_the_force(name, bend):
     table = dent_law(name).table
-    for depth in (0.13e-3, 1.02e-3, 6.3e-3, 16e-3):
+    for depth in (0.13e-3, 1.02e-3, 6.31e-3, 16e-3):  # between rows: at one the slope turns
         step = 1e-9
         up, down = (dent_force(table, depth + s, R, bend, E)[0] for s in (step, -step))
         assert dent_force(table, depth, R, bend, E)[1] == pytest.approx((up - down) / (2 * step), rel=1e-4)
@@ -108,11 +108,11 @@ def test_axisymmetric_solution_meets_punches_and_the_tables():
     from tools.dent_table import press_curve
 
     body = HalfSpace(0.08, NU, "linear", 0.4)
-    stuck = body.top[:11]
-    inside, outside = body.points[body.top[10], 0], body.points[body.top[11], 0]
+    stuck = body.top[:21]
+    inside, outside = body.points[body.top[20], 0], body.points[body.top[21], 0]
     radius = 0.5 * (inside + outside)  # the edge of a held disc lies between its last ring and the next
     sideways = body.tangential_stiffness(np.zeros_like(body.points), stuck)
-    assert sideways == pytest.approx(bonded_punch_sideways_force(1.0, radius, 1.0, NU), rel=0.03)
+    assert sideways == pytest.approx(bonded_punch_sideways_force(1.0, radius, 1.0, NU), rel=0.02)
     assert flat_punch_force(1.0, radius, 1.0, NU) == pytest.approx(2 * radius / (1 - NU**2))
     for law, nu in (("linear", NU), ("neo-hookean", NU), ("linear", 0.35)):
         rows = press_curve(law, nu, 0.15, 0.3)

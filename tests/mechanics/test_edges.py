@@ -86,7 +86,7 @@ def test_the_base_holds_what_lies_close_above_it(block):
 )
 def test_a_base_comes_nearer_as_the_tip_goes_in_at_finite_strain_alone(law, known):
     """Presses of 1 to 8 mm into a layer of 40 mm, solved (tools.dent_edge), 1e-6 N of unit modulus: what is
-    left does not grow with depth. Without what the far base braces the law at finite strain falls by 1.7 %
+    left does not grow with depth. Without what the far base braces the law at finite strain falls by 1.9 %
     from 2 to 8 mm; with it the linear one rises by 1.5 %."""
     from palpate.mechanics.shape.tetmesh import box_mesh
 
@@ -97,8 +97,8 @@ def test_a_base_comes_nearer_as_the_tip_goes_in_at_finite_strain_alone(law, know
     kept = {"young_modulus_pa": 1.0, "tip_radius_m": 0.005, "law": law}
     force = forces_at(sites, -way[:, None] * UP, np.array([0, len(way)]), **kept)[:, 2]
     left = np.interp(depths, way, force) / (1e-6 * np.array(known)) - 1
-    assert np.abs(left).max() < 0.016
-    assert abs(left[-1] - left[1]) < 0.005
+    assert np.abs(left).max() < 0.012
+    assert abs(left[-1] - left[1]) < 0.007
     double = edge_law(box_mesh((16, 16, 8), (0.16, 0.16, 0.08)), 2 * at, UP[None])
     assert sites.braced[0] == pytest.approx(4 * double.braced[0], rel=0.1)
 
