@@ -23,7 +23,7 @@ def _module() -> ModuleType:
     def prepared(surface: Surface, options: MeshingOptions) -> Mesher:
         size = np.ptp(surface.vertices, axis=0)
         made = box_mesh(tuple(np.round(size / options.mesh_size_m).astype(int)), tuple(size))
-        return Mesher(lambda: (made.points.copy(), made.tetrahedra.copy()), 1e-5)
+        return Mesher(lambda take: (made.points.copy(), made.tetrahedra.copy()), 1e-5)
 
     module.prepared = prepared
     return module
