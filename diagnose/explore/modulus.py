@@ -30,6 +30,8 @@ MOST = 3
 LEAST = 0.025
 """Of their probabilities: what is less likely moves no end of a 95 % interval."""
 SAME_S = 1e-6
+STEPS = 60
+"""Of a fit, at most: two branches of a relaxation lie along a valley, where 8 left a modulus 2.6 % low."""
 
 
 def modulus_beside(
@@ -78,7 +80,9 @@ def _beside(
     # a delay that was found is part of every hypothesis: presses are weighed as read
     late = (DELAY,) if e.presses_placed.delay_s and name != DELAY.name else ()
     acting = [effect(name), *late]
-    fitted = fit(w.forward, w.whitener, acting, modulus=w.found.modulus, onset=w.found.onset, iterations=8)
+    fitted = fit(
+        w.forward, w.whitener, acting, modulus=w.found.modulus, onset=w.found.onset, iterations=STEPS
+    )
     # to where the ideal model has it from the first touches as found: a play or a delay has moved those too
     settings = settings_of(w.forward, fitted.effects, fitted.values, fitted.onset)
     change = np.nan_to_num(w.forward.predict(settings) - w.forward.predict(w.forward.ideal(fitted.modulus)))

@@ -93,14 +93,13 @@ def fill(surface: Surface, options: MeshingOptions | None = None, progress: Prog
     mesher = prepared(surface, options)
     made: list[tuple[float, TetMesh]] = []
     for take in range(_TRIES):
-        rest = _TRIES - 1 - take
-        progress("meshing", 0.8 * (1 - (rest + 1) / _TRIES))
+        progress("meshing", 0.8 * take / _TRIES)
         points, cells = mesher.fill(take)
         # a tetrahedron may be flattened, or beyond what relaxing mends; the mesher's next mesh is another
         try:
             mesh = _standing(points, cells, surface, mesher.envelope_m, options.radius_edge_ratio)
         except MeshError:
-            if not rest and not made:
+            if take == _TRIES - 1 and not made:
                 raise
             continue
         worst = float(radius_edge_ratio(mesh.points[mesh.tetrahedra]).max())
