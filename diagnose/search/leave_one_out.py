@@ -36,8 +36,8 @@ class JudgedSet:
 
     @property
     def over(self) -> float:
-        """Of what differs from place to place: the set's own lack of fit. Where the
-        places scatter less than our own errors are said to be, these are as small as so many places tell."""
+        """Of what differs from place to place: the set's own lack of fit. Where the places scatter less than
+        our own errors are said to be, these are as small as so many places tell."""
         places = len(self.held)
         told = (STATED + places * self.place_chi) / (STATED + places)
         return max(told, self.place_chi, self.chi if self.chi > 1 else 0.0)

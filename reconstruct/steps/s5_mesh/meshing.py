@@ -94,7 +94,7 @@ def fill(surface: Surface, options: MeshingOptions | None = None, progress: Prog
     made: list[tuple[float, TetMesh]] = []
     for take in range(_TRIES):
         progress("meshing", 0.8 * take / _TRIES)
-        points, cells = mesher.fill(take)
+        points, cells = mesher.fill(take=take)
         # a tetrahedron may be flattened, or beyond what relaxing mends; the mesher's next mesh is another
         try:
             mesh = _standing(points, cells, surface, mesher.envelope_m, options.radius_edge_ratio)

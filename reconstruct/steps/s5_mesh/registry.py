@@ -26,11 +26,11 @@ AUTO, USUAL = "auto", "surface"
 
 
 class Mesher(NamedTuple):
-    """A mesher with its input. fill(take): nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, device
+    """A mesher with its input. fill(take=0): nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, device
     frame; another take may be another mesh; raises MeshError. envelope_m: how far from its input it may
     lay the mesh's surface."""
 
-    fill: Callable[[int], tuple[np.ndarray, np.ndarray]]
+    fill: Callable[..., tuple[np.ndarray, np.ndarray]]
     envelope_m: float
 
 

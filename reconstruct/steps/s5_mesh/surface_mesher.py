@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from palpate.reconstruction.steps.s5_mesh.registry import Mesher
 from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
@@ -22,10 +21,5 @@ def prepared(surface: Surface, options: MeshingOptions) -> Mesher:
     )
     # so narrow an envelope keeps volume and edges
     envelope_m = min(0.15 * options.surface_distance_m, 0.03 * edge_m)
-
-    def fill(take: int) -> tuple[np.ndarray, np.ndarray]:
-        return tetrahedralize(
-            vertices, triangles, edge_m=edge_m, envelope_m=envelope_m, simplify=False, take=take
-        )
-
+    fill = partial(tetrahedralize, vertices, triangles, edge_m=edge_m, envelope_m=envelope_m, simplify=False)
     return Mesher(fill, envelope_m)

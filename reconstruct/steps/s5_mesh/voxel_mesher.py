@@ -5,6 +5,7 @@ labels (section 2.2).
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,11 +32,9 @@ def prepared(surface: Surface, options: MeshingOptions) -> Mesher:
     vertices, triangles = voxel_surface(flat, surface.triangles, _PITCH * sigma)
     vertices = vertices @ frame + surface.support_point
     envelope_m = _ENVELOPE * sigma
-
-    def fill(take: int) -> tuple[np.ndarray, np.ndarray]:
-        size_m = options.mesh_size_m
-        return tetrahedralize(vertices, triangles, edge_m=size_m, envelope_m=envelope_m, take=take)
-
+    fill = partial(
+        tetrahedralize, vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope_m, simplify=True
+    )
     return Mesher(fill, envelope_m)
 
 
