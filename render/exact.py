@@ -75,7 +75,7 @@ class ExactPlaces:
         arrays = renderer.contact.arrays
         surface = felt_of(model.mesh, (arrays.vertices, arrays.triangles))
         self._presses = SolvedPresses(
-            model.mesh.linear(), surface, model.element_ratio, poisson_ratio=model.material.poisson_ratio,
+            model.mesh.linear(), surface, model.solid_ratio, poisson_ratio=model.material.poisson_ratio,
             tip_radius_m=self.tip_m * touch.tip_ratio, options=self.options,
         )  # fmt: skip
 

@@ -42,7 +42,13 @@ LEAST_FLATNESS = 0.9
 def solver_of(model: Model) -> Solver:
     """The solver of touches on the model, balls and all."""
     balls = tuple(model.material.inclusions.values())
-    return touch_solver(model.mesh, model.material.poisson_ratio, model.ratio_without_balls, balls=balls)
+    return touch_solver(
+        model.mesh,
+        model.material.poisson_ratio,
+        model.surface_ratio,
+        balls=balls,
+        stretch_m=model.stretch_m,
+    )
 
 
 def palpate_model(

@@ -62,7 +62,8 @@ FINE, COARSE = Grading(), Grading(60.0, 1.3, 1.3)
 
 
 class HalfSpace:
-    """Axisymmetric body r >= 0, z <= 0, fixed at its far ends; displacements (n, 2)."""
+    """Axisymmetric body r >= 0, z <= 0, fixed at its far ends; displacements (n, 2). along, down: the borders
+    of its elements, else those of `grading`."""
 
     def __init__(
         self,
@@ -72,10 +73,14 @@ class HalfSpace:
         until: float,
         stiffening: float = 0.0,
         grading: Grading = FINE,
+        along: np.ndarray | None = None,
+        down: np.ndarray | None = None,
     ) -> None:
-        r = graded(element, 1.0 + 0.35 * until, grading.along, grading.extent)
-        z = -graded(element, 0.5, grading.down, grading.extent)
-        r, z = _halved(r), _halved(z)
+        r = along
+        if r is None:
+            r = graded(element, 1.0 + 0.35 * until, grading.along, grading.extent)
+        z = graded(element, 0.5, grading.down, grading.extent) if down is None else down
+        r, z = _halved(r), -_halved(z)
         nr, nz = len(r), len(z)
         self.points = np.stack(np.meshgrid(r, z, indexing="ij"), -1).reshape(-1, 2)
         i, j = np.meshgrid(np.arange(0, nr - 1, 2), np.arange(0, nz - 1, 2), indexing="ij")
@@ -165,8 +170,8 @@ class HalfSpace:
         log = np.log(j)[:, None]
         return self.lam * log * g, self.lam * (g[:, :, None] * g[:, None, :] - log[:, :, None] * cross)
 
-    def tangential_stiffness(self, u: np.ndarray, stuck: np.ndarray) -> float:
-        """Force a unit sideways motion of the nodes `stuck`, small upon the deformation u (n, 2).
+    def sideways(self, u: np.ndarray) -> sp.csr_matrix:
+        """(3 n, 3 n) stiffness of small motions sideways upon the deformation u (n, 2).
 
         First harmonic: (U cos, V sin, W cos) of the angle, with S = U + V as unknown, which vanishes on
         the axis.
@@ -189,12 +194,20 @@ class HalfSpace:
             tangent += sines @ (self._sideways(h, part) * half) @ sines.transpose(0, 2, 1)
         dof = (3 * self.cells[:, :, None] + np.arange(3)).reshape(m, 27)
         rows, columns = np.repeat(dof, 27, axis=1).ravel(), np.tile(dof, (1, 27)).ravel()
-        matrix = sp.csr_matrix((tangent.ravel(), (rows, columns)), shape=(3 * n, 3 * n))
-        held = np.zeros((n, 3), dtype=bool)
+        return sp.csr_matrix((tangent.ravel(), (rows, columns)), shape=(3 * n, 3 * n))
+
+    def held_sideways(self) -> np.ndarray:
+        """(n, 3) bool, of U, S, W that are held."""
+        held = np.zeros((len(self.points), 3), dtype=bool)
         held[self.points[:, 0] == 0, 1:] = True
         held[self.fixed[:, 1]] = True
+        return held
+
+    def tangential_stiffness(self, u: np.ndarray, stuck: np.ndarray) -> float:
+        """Force a unit sideways motion of the nodes `stuck`, small upon the deformation u (n, 2)."""
+        matrix, held = self.sideways(u), self.held_sideways()
         held[stuck] = True
-        given = np.zeros((n, 3))
+        given = np.zeros(held.shape)
         given[stuck, 0] = 1.0
         motion = given.ravel()
         free = np.flatnonzero(~held.ravel())

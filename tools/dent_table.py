@@ -90,7 +90,7 @@ class Press:
                 self.u = start.copy()
                 b = 0.5 * (a + b)
                 continue
-            if abs(gap_b) < 1e-9:
+            if abs(gap_b) < 1e-9 or a == b:  # or it has bulged onto the sphere already
                 break
             a, gap_a, b = b, gap_b, max(b - gap_b * (b - a) / (gap_b - gap_a), depth)
         place = self.body.points[self.body.top[self.stuck]] + self.u[self.body.top[self.stuck]]

@@ -20,7 +20,9 @@ from palpate.mechanics.contact.dent import bend_of, effective_radius
 from palpate.mechanics.contact.touch import TouchedPlaces
 from palpate.mechanics.effects.laws_along_path import new_memory, path_numbers
 from palpate.mechanics.effects.settings import ForwardSettings, TouchTerms
+from palpate.mechanics.effects.skin_layer import EFFECT as SKIN
 from palpate.mechanics.effects.skin_layer import beneath_skin
+from palpate.mechanics.errors import OptionError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.press_solver.press import LAWS
 from palpate.mechanics.press_solver.solved_places import ExactPresses, PlacesToSolve, solve_touched
@@ -190,13 +192,16 @@ def build_forward(touches: Presses, model: Model) -> Forward:
 
 
 def solved(forward: Forward, progress: Progress = silent) -> Forward:
-    """The same with its touched places solved under every law that a diagnosis weighs."""
+    """The same with its touched places solved under every law that a diagnosis weighs. Raises OptionError for
+    a model under a skin, which no press is solved with."""
     t, places, model = forward.touches, forward.places, forward.model
+    if model.material.skin is not None:
+        raise OptionError(f"no press is solved with {SKIN.name}: leave out --exact")
     far = np.einsum("pji,pjk,pkl->pil", places.frame, places.far, places.frame)
     known = TouchedPlaces(t.normal, far, places.curvature, places.bracing, places.braced)
     felt = felt_surface(model)
     exact = solve_touched(
-        model.mesh, PlacesToSolve(t.point, place_of(t), t.deepest, known), LAWS, ratio=model.element_ratio,
+        model.mesh, PlacesToSolve(t.point, place_of(t), t.deepest, known), LAWS, ratio=model.solid_ratio,
         poisson_ratio=model.material.poisson_ratio, young_modulus_pa=model.material.young_modulus_pa,
         tip_radius_m=forward.tip_radius, surface=(felt.points, felt.triangles), progress=progress,
     )  # fmt: skip

@@ -1,8 +1,8 @@
 """The far field of places in an object that is not uniform, or not of the stated Poisson's ratio.
 
 The compliance of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that
-are stiffer by m_e take their share divided by about m_e, so inclusions, gradients and skins are weights on
-one array. Another Poisson's ratio is a new factorisation, done once at a few values and interpolated.
+are stiffer by m_e take their share divided by about m_e, so inclusions and gradients are weights on one
+array. Another Poisson's ratio or a skin is a new factorisation, done once at a few values and interpolated.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance
 from palpate.mechanics.compliance.pressed_places import UNIFORM, Places
 from palpate.mechanics.compliance.sites import PATCH_WIDTH_IN_EDGES, typical_edge
 from palpate.mechanics.elastic.elasticity import element_stiffness
+from palpate.mechanics.elastic.membrane import half_space_change
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.shape.tetmesh import TetMesh
 
@@ -25,6 +27,9 @@ _CHUNK, _BATCH = 600, 24
 _SIX = np.triu_indices(3)
 _UNFELT, _FEW = 1e-6, 0.4
 """Of the greatest weight: as good as none; share of the elements below which only those are summed."""
+STRETCHES_M, _STRETCHED_M = (0.0, 0.004, 0.020, 0.152), 0.010
+"""Stretch lengths of skins that are solved, m, to that of 8 mm and 20 times the modulus, and the one above
+which the change grows with their logarithm."""
 _KNOWN = 16
 """Far fields that are remembered: a fit moves first touches many times between two changes of the object."""
 
@@ -137,6 +142,21 @@ def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30,
     return places.far + _interpolate(table["ratios"], table["far"], nu)
 
 
+def far_under_skin(places: Places, stretch_m: float) -> np.ndarray:
+    """(p, 3, 3) 1/m, change of the far field by a membrane on the surface (mechanics.elastic.membrane), no
+    wider than STRETCHES_M: smooth between factorisations."""
+
+    def solve() -> dict[str, np.ndarray]:
+        mesh, fields = places.model.mesh.quadratic(), energy_fields(places)
+        nu, own = places.model.material.poisson_ratio, fields.whole - fields.half_space
+        fars = [_far(places, mesh, nu, stretch) - own[places.place] for stretch in STRETCHES_M[1:]]
+        return {"change": np.array([np.zeros_like(places.far), *fars])}
+
+    change = places.stage("skins", lambda: places.stored("skins", solve))["change"]
+    at = np.log1p(np.array(STRETCHES_M) / _STRETCHED_M)
+    return np.asarray(CubicSpline(at, change)(np.log1p(min(stretch_m, STRETCHES_M[-1]) / _STRETCHED_M)))
+
+
 def load_sampler(mesh: TetMesh) -> PatchSampler:
     """Of the load that the energies are of, as wide as the mesh bears."""
     return PatchSampler(mesh, PATCH_WIDTH_IN_EDGES * typical_edge(mesh))
@@ -157,14 +177,16 @@ def _unit_loads(places: Places, mesh: TetMesh, sampler: PatchSampler, some: slic
     return forces
 
 
-def _far(places: Places, mesh: TetMesh, nu: float) -> np.ndarray:
-    """(p, 3, 3) local far field at another Poisson's ratio: one factorisation."""
-    sampler, solver = load_sampler(mesh), Solver(mesh, nu)
+def _far(places: Places, mesh: TetMesh, nu: float, stretch_m: float = 0.0) -> np.ndarray:
+    """(p, 3, 3) local far field at another Poisson's ratio, or under a membrane: one factorisation."""
+    sampler, solver = load_sampler(mesh), Solver(mesh, nu, stretch_m=stretch_m)
     far = np.empty((len(places.first), 3, 3))
     for some in _batches(len(far)):
         loads = _unit_loads(places, mesh, sampler, some).reshape(3 * len(mesh.points), -1, 3)
         far[some] = solver.quadratic_forms(loads[solver.free])
-    return (far - half_space_compliance(np.array([1.0, 0.0, 0.0]), nu, sampler.width_m))[places.place]
+    along = np.array([1.0, 0.0, 0.0])
+    half = half_space_compliance(along, nu, sampler.width_m)
+    return (far - half - half_space_change(along, nu, sampler.width_m, stretch_m))[places.place]
 
 
 def _interpolate(x: np.ndarray, table: np.ndarray, value: float) -> np.ndarray:

@@ -100,15 +100,16 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
     stages: dict[str, Any] = {}
 
     def solve() -> dict[str, np.ndarray]:
-        ratio = model.element_ratio if np.ptp(model.element_ratio) > 0 else None
+        ratio = model.solid_ratio if np.ptp(model.solid_ratio) > 0 else None
         mesh, nu = model.mesh.quadratic(), model.material.poisson_ratio
-        solver = touch_solver(mesh, nu, ratio)
-        if ratio is None:
+        solver = touch_solver(mesh, nu, ratio, stretch_m=model.stretch_m)
+        uniform = ratio is None and not model.stretch_m
+        if uniform:
             stages[UNIFORM] = solver
         patch = LoadPatch(tip_radius_m=model.tool.tip_radius_m, balls=True) if balls else LoadPatch()
         sites = touch_sites(mesh, point[first], normal[first], nu, solver=solver, patch=patch)
         solved = {name: getattr(sites, name) for name in ("far", *BENT_BY)}
-        if ratio is None:
+        if uniform:
             return solved
         softness, back = given_back(model, point[first], normal[first], sites.patch_width_m)
         return {**solved, "far": sites.far + back, "softness": softness}
@@ -146,12 +147,12 @@ def _stored(
 ) -> dict[str, np.ndarray]:
     """A stage depends on shape and places alone: keyed by their content. Damaged files are built anew."""
     path = None if model.path is None else model.path / f"diagnosis-{name}.cache"
-    mesh, skin = model.mesh, model.material.skin
+    mesh, ratio = model.mesh, model.solid_ratio
     key = content_key(
-        name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, model.element_ratio,
+        name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, ratio,
         "" if mesh.shape is None else mesh.shape.key,
         model.material.poisson_ratio, point, normal,
-        *([model.tool.tip_radius_m] if np.ptp(model.element_ratio) > 0 else []),
-        *([] if skin is None else [skin.thickness_m, skin.modulus_ratio]),
+        *([model.tool.tip_radius_m] if np.ptp(ratio) > 0 else []),
+        *([model.stretch_m] if model.stretch_m else []),
     )  # fmt: skip
     return load_or_build(path, key, build)

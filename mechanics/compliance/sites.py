@@ -106,12 +106,14 @@ def touch_solver(
     balls: Sequence[Ball] = (),
     surface_edge_m: float | None = None,
     hold: BaseHold | None = None,
+    stretch_m: float = 0.0,
 ) -> Solver:
     """A solver fit for touches: quadratic, the surface's elements halved until they are small enough.
 
     A patch as narrow as the contact needs them; with wider ones, places near an edge or the base come out 3
     to 5 % too soft. Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
-    `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out.
+    `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out. stretch_m:
+    of a skin (mechanics.elastic.membrane).
     """
     corners, edge_m = mesh.linear(), surface_edge_m or surface_edge(mesh)
     ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
@@ -119,15 +121,16 @@ def touch_solver(
         ratio = None
     made = _made.get()
     if made is None:
-        return _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold)
+        return _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold, stretch_m)
     key = content_key(
         corners.points, corners.tetrahedra, corners.fixed, corners.touchable,
         "" if mesh.shape is None else mesh.shape.key,
-        poisson_ratio, ratio, edge_m, *map(astuple, balls), *(() if hold is None else astuple(hold)),
+        poisson_ratio, ratio, edge_m, stretch_m, *map(astuple, balls),
+        *(() if hold is None else astuple(hold)),
     )  # fmt: skip
     if key not in made:
         made.clear()
-        made[key] = _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold)
+        made[key] = _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold, stretch_m)
     return made[key]
 
 
@@ -138,6 +141,7 @@ def _factorised(
     edge_m: float,
     balls: Sequence[Ball],
     hold: BaseHold | None,
+    stretch_m: float,
 ) -> Solver:
     fine, parent = refined_near_surface(mesh, edge_m)
     for ball in balls:
@@ -147,7 +151,7 @@ def _factorised(
         ratio = ratio[parent]
     if balls:
         ratio = with_balls(fine, ratio, balls)
-    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold)
+    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold, stretch_m=stretch_m)
 
 
 @contextmanager

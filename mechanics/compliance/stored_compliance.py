@@ -21,7 +21,6 @@ from palpate.mechanics.effects.hold import base_hold
 from palpate.mechanics.elastic.held_base import BaseHold
 from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import CacheError
-from palpate.mechanics.model.material import with_balls
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.tetmesh import TetMesh
@@ -52,7 +51,8 @@ def compliance_key(model: Model, *, dense: bool = False) -> str:
         model.mesh.touchable,
         "" if model.mesh.shape is None else model.mesh.shape.key,
         material.poisson_ratio,
-        model.ratio_without_balls,
+        model.surface_ratio,
+        *([model.stretch_m] if model.stretch_m else []),
         *(() if hold is None else dataclasses.astuple(hold)),
         *(() if error is None else ("low-rank", error)),
         *([model.tool.tip_radius_m, "felt by depth"] if balls else []),
@@ -85,9 +85,10 @@ def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompli
         made = surface_compliance(
             model.mesh,
             material.poisson_ratio,
-            model.ratio_without_balls,
+            model.surface_ratio,
             balls=tuple(material.inclusions.values()),
             hold=hold,
+            stretch_m=model.stretch_m,
             low_rank_error=low_rank_error(model.mesh),
             tip_radius_m=model.tool.tip_radius_m,
             solved=kept_places(model),
@@ -156,15 +157,15 @@ def _places_of(model: Model) -> tuple[str, Path | None]:
 
 def _on_demand(model: Model) -> OnDemandCompliance:
     hold = _hold(model)
-    mesh, nu, ratio = model.mesh, model.material.poisson_ratio, model.ratio_without_balls
+    mesh, nu, ratio = model.mesh, model.material.poisson_ratio, model.surface_ratio
     balls = tuple(model.material.inclusions.values())
-    tip = model.tool.tip_radius_m
+    tip, stretch = model.tool.tip_radius_m, model.stretch_m
     key, path = _places_of(model)
     return OnDemandCompliance(
         mesh,
         nu,
-        partial(fine_corners, mesh, nu, ratio, balls=balls, hold=hold, tip_radius_m=tip),
-        lambda: Solver(mesh.quadratic(), nu, with_balls(mesh, ratio, balls) if balls else ratio, hold=hold),
+        partial(fine_corners, mesh, nu, ratio, balls=balls, hold=hold, stretch_m=stretch, tip_radius_m=tip),
+        lambda: Solver(mesh.quadratic(), nu, model.solid_ratio, hold=hold, stretch_m=stretch),
         key,
         path,
     )

@@ -120,13 +120,14 @@ def surface_compliance(
     *,
     balls: Sequence[Ball] = (),
     hold: BaseHold | None = None,
+    stretch_m: float = 0.0,
     low_rank_error: float | None = None,
     tip_radius_m: float = USUAL_TIP_RADIUS_M,
     solved: OnDemandCompliance | None = None,
     progress: Progress = silent,
 ) -> SurfaceCompliance:
     """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None, without the balls;
-    hold: None, bonded.
+    hold: None, bonded; stretch_m: of a skin (mechanics.elastic.membrane).
 
     low_rank_error: None for dense blocks; else the relative error to which a factor stands in for them, under
     a patch of at least WIDE_PATCH_M. tip_radius_m: only matters where a ball lies close below the surface
@@ -136,7 +137,7 @@ def surface_compliance(
     # between places a loose base rests on the floor: never softer than what each place has of its own
     resting = None if hold is None else replace(hold, resting=True)
     drawn = with_balls(mesh, modulus_ratio, balls) if balls else modulus_ratio
-    coarse = Solver(mesh.quadratic(), poisson_ratio, drawn, hold=resting)
+    coarse = Solver(mesh.quadratic(), poisson_ratio, drawn, hold=resting, stretch_m=stretch_m)
     nodes, triangles = corners_of(coarse.mesh)
     points = coarse.mesh.points[nodes]
     normals = normals_of(coarse.mesh, nodes)
@@ -152,8 +153,8 @@ def surface_compliance(
     del coarse
     if solved is None:
         fine = fine_corners(
-            mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold, tip_radius_m=tip_radius_m,
-            solver=serves,
+            mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold, stretch_m=stretch_m,
+            tip_radius_m=tip_radius_m, solver=serves,
         )  # fmt: skip
         (own, bracing), own_width = fine.own(progress=progress), np.array([fine.width_m])
         own_points, own_normals, own_triangles = fine.points, fine.normals, fine.triangles

@@ -75,11 +75,18 @@ class DentLaw:
         _dent_forces(self.table, depth, float(tip_radius_m), float(plane_strain), force)
         return force
 
-    def scaled(self, c: np.ndarray | float, tau: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
+    def scaled(
+        self,
+        c: np.ndarray | float,
+        tau: np.ndarray | float = 1.0,
+        bent: np.ndarray | float = 0.0,
+        *,
+        name: str = "",
+    ) -> DentLaw:
         """The law with its normal force and sideways stiffness multiplied by factors, one or one a row of
-        `grid()`."""
+        `grid()`; bent: by how much that of the force grows with the bend of the surface, over it."""
         own = self.table
-        table = _table(own[:, 0] * c, own[:, 1], own[:, 1] * own[:, 2] * tau, own[:, 3])
+        table = _table(own[:, 0] * c, own[:, 1], own[:, 1] * own[:, 2] * tau, own[:, 3] + bent)
         return replace(self, name=name or self.name, table=table)
 
 

@@ -143,8 +143,9 @@ def solved_change(ball: Ball, places: Places) -> tuple[np.ndarray, np.ndarray]:
     takes where there are balls, and of its bracing."""
     model = places.model
     mesh, nu = model.mesh.quadratic(), model.material.poisson_ratio
-    uniform = np.ptp(model.element_ratio) == 0
-    solver = touch_solver(mesh, nu, None if uniform else model.element_ratio, balls=(ball,))
+    ratio, stretch = model.solid_ratio, model.stretch_m
+    uniform = np.ptp(ratio) == 0
+    solver = touch_solver(mesh, nu, None if uniform else ratio, balls=(ball,), stretch_m=stretch)
     point, normal = places.point[places.first], places.normal[places.first]
     width = patch_width(solver.mesh) if uniform else None
     patch = LoadPatch(width, model.tool.tip_radius_m, balls=True)

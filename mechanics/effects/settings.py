@@ -19,13 +19,13 @@ STICKS = float("inf")
 class TouchTerms:
     """What one tip feels where it touches; prediction and renderer read it.
 
-    dent_law: name of the dent's law; factors: functions of Poisson's ratio that give the factors on its
-    normal force and sideways stiffness, (k,) each, at mechanics.contact.dent.grid(). tip_ratio: radius of the
+    dent_law: name of the dent's law; factors: functions of Poisson's ratio that give what DentLaw.scaled
+    takes, (k,) each, at mechanics.contact.dent.grid(). tip_ratio: radius of the
     tip over the stated one. friction: Coulomb's coefficient. numbers: (k,) of each law along the path.
     """
 
     dent_law: str = "linear"
-    factors: list[Callable[[float], tuple[np.ndarray, np.ndarray]]] = field(default_factory=list)
+    factors: list[Callable[[float], tuple[np.ndarray, ...]]] = field(default_factory=list)
     tip_ratio: float = 1.0
     friction: float = STICKS
     numbers: dict[PathLaw, np.ndarray] = field(default_factory=dict)

@@ -1,8 +1,6 @@
-"""A skin of another stiffness: the dent feels it as a layer bonded to a half-space, by the contact's radius.
-
-The modulus under a contact is that under a flat punch of its radius (mechanics.compliance.local_material):
-the skin's for a small one, the object's for a wide one, so a stiff skin is stiff at first touch and less so
-deeper. How the skin holds the whole object together is in the far field, by material.skin_ratio.
+"""A skin of another stiffness: the dent feels it as a layer bonded to a half-space (mechanics.contact.skin),
+a stiff one stiff at first touch and less so deeper; and it holds the object together as a membrane on its
+surface (mechanics.elastic.membrane). A soft one lets the object as a whole be.
 """
 
 from __future__ import annotations
@@ -11,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from palpate.mechanics.compliance.far_field import energy_fields, far_with_weights
-from palpate.mechanics.compliance.local_material import patch_softness, punch_factor
-from palpate.mechanics.compliance.pressed_places import Places
-from palpate.mechanics.contact.dent import grid
+from palpate.mechanics.compliance.far_field import far_under_skin
+from palpate.mechanics.contact.skin import skin_factors
 from palpate.mechanics.effects.base import Effect, Parameter, Scope
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import ForwardSettings, TouchedScene, TouchTerms
@@ -23,13 +19,8 @@ from palpate.mechanics.model.model import Model
 
 
 def _set(touch: TouchTerms, skin: Skin, model: Model) -> None:
-    contact = model.tool.tip_radius_m * np.sqrt(np.maximum(grid(), 1e-6))
-
-    def factors(poisson_ratio: float) -> tuple[np.ndarray, np.ndarray]:
-        own = punch_factor(contact, skin, poisson_ratio)
-        return own, own
-
-    touch.factors.append(factors)
+    factors = skin_factors(skin, model.tool.tip_radius_m)
+    touch.factors.append(lambda poisson_ratio: factors)
 
 
 def beneath_skin(touch: TouchTerms, model: Model) -> None:
@@ -45,19 +36,7 @@ def _report(values: np.ndarray, scene: TouchedScene, modulus_pa: float) -> dict[
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     places, skin = scene.places, Skin(**_report(values, scene, settings.modulus))
     _set(settings.touch, skin, places.model)
-    fields = energy_fields(places)
-    local = 1 - patch_softness(fields.width_m, skin, places.model.material.poisson_ratio)
-    settings.far = settings.far + _stretched(skin, places) + local * fields.half_space
-
-
-def _stretched(skin: Skin, places: Places) -> np.ndarray:
-    """(p, 3, 3) 1/m, change of each press's compliance, unit modulus, as if the skin were stretched like the
-    object that it covers: C (C + (m - 1) E)^-1 C - C, of the energy E that the skin's elements hold of C."""
-    fields, thickness = energy_fields(places), skin.thickness_m
-    inside = np.clip(thickness / np.maximum(fields.depth, 1e-6), 0, 1) * (fields.depth < 2 * thickness)
-    held = far_with_weights(places, 1 + inside) - places.far
-    whole = fields.whole[places.place]
-    return whole @ np.linalg.solve(whole + (skin.modulus_ratio - 1) * held, whole) - whole
+    settings.far = settings.far + far_under_skin(places, skin.stretch_m)
 
 
 EFFECT = Effect(

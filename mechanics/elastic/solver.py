@@ -13,6 +13,7 @@ from palpate.mechanics.elastic import pardiso
 from palpate.mechanics.elastic.dissected import DissectedFactor, products
 from palpate.mechanics.elastic.elasticity import LOCAL_BULK, stiffness_blocks
 from palpate.mechanics.elastic.held_base import BaseHold
+from palpate.mechanics.elastic.membrane import membrane_stiffness
 from palpate.mechanics.errors import MeshError, OptionError
 from palpate.mechanics.shape.tetmesh import TetMesh
 
@@ -25,8 +26,9 @@ class Solver:
     """Displacements for nodal forces on a mesh with a fixed base, for unit Young's modulus.
 
     modulus_ratio: (m,) or None. backend: 'pardiso', 'superlu' or None for the best that is there.
-    local_bulk: see `element_stiffness`. hold: how the base is held; None: bonded. The factorisation is done
-    in the constructor. Raises MeshError where nothing is fixed (rigid motion).
+    local_bulk: see `element_stiffness`. hold: how the base is held; None: bonded. stretch_m: of a skin
+    (mechanics.elastic.membrane). The factorisation is done in the constructor. Raises MeshError where nothing
+    is fixed (rigid motion).
     """
 
     def __init__(
@@ -38,19 +40,25 @@ class Solver:
         backend: str | None = None,
         local_bulk: float = LOCAL_BULK,
         hold: BaseHold | None = None,
+        stretch_m: float = 0.0,
     ) -> None:
         self.mesh = mesh
         self.poisson_ratio = poisson_ratio
         self.hold = hold
+        self.stretch_m = stretch_m
         self.modulus_ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
         self.backend = backend or ("pardiso" if pardiso.available() else "superlu")
         if self.backend not in BACKENDS:
             raise OptionError(f"backend is '{backend}'; allowed are {', '.join(BACKENDS)}")
         self.free = free_dofs(mesh, hold)
         full = stiffness_blocks(mesh, poisson_ratio, modulus_ratio, local_bulk=local_bulk)
-        springs = None if hold is None else hold.stiffness(mesh)
-        if springs is not None:
-            full = full + springs.tobsr((3, 3))
+        added = [] if hold is None else [hold.stiffness(mesh)]
+        if stretch_m:
+            ratio = np.ones(len(mesh.tetrahedra)) if self.modulus_ratio is None else self.modulus_ratio
+            added += [membrane_stiffness(mesh, poisson_ratio, stretch_m * ratio[mesh.touchable_elements])]
+        for springs in added:
+            if springs is not None:
+                full = full + springs.tobsr((3, 3))
         self.matrix = _of_nodes(full, self.free[::3] // 3)
         self._factor: Any
         try:

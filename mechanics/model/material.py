@@ -70,6 +70,11 @@ class Skin:
         for name in ("thickness_m", "modulus_ratio"):
             object.__setattr__(self, name, positive(name, getattr(self, name)))
 
+    @property
+    def stretch_m(self) -> float:
+        """m, of the membrane that it is for the whole object; a soft one is none."""
+        return self.thickness_m * max(min(self.modulus_ratio, MODULUS_LIMITS[1]) - 1, 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class ObjectMaterial:

@@ -109,19 +109,24 @@ class Model(Result):
     @cached_property
     def element_ratio(self) -> np.ndarray:
         """(m,) modulus of each tetrahedron over the global one, of all parts of the material."""
-        return with_balls(self.mesh, self.ratio_without_balls, self.material.inclusions.values())
+        skin, bulk = self.material.skin, self._bulk_ratio
+        within = self.surface_ratio if skin is None else within_limits(bulk * skin_ratio(self.mesh, skin))
+        return with_balls(self.mesh, within, self.material.inclusions.values())
 
     @cached_property
-    def ratio_without_balls(self) -> np.ndarray:
-        """(m,) of what the balls lie in, for meshes on which they are drawn by themselves."""
-        skin = self.material.skin
-        if skin is None:
-            return self.surface_ratio
-        return within_limits(self._bulk_ratio * skin_ratio(self.mesh, skin))
+    def solid_ratio(self) -> np.ndarray:
+        """(m,) without the skin, which our solvers have as a membrane (mechanics.elastic.membrane)."""
+        return with_balls(self.mesh, self.surface_ratio, self.material.inclusions.values())
+
+    @property
+    def stretch_m(self) -> float:
+        """m, of that membrane."""
+        return 0.0 if self.material.skin is None else self.material.skin.stretch_m
 
     @cached_property
     def surface_ratio(self) -> np.ndarray:
-        """(m,) of what a dent meets beside its law: without balls, which lie inside, and without the skin."""
+        """(m,) without the skin and without balls: what a dent meets beside its law, and what balls lie in
+        where they are drawn by themselves."""
         return within_limits(self._bulk_ratio)
 
     @cached_property

@@ -41,7 +41,8 @@ class MovingInclusion:
         self._mesh = model.mesh.quadratic()
         material = model.material
         hold = base_hold(model.effects, model.support.normal, material.young_modulus_pa)
-        self._solver = Solver(self._mesh, material.poisson_ratio, model.element_ratio, hold=hold)
+        nu, stretch = material.poisson_ratio, model.stretch_m
+        self._solver = Solver(self._mesh, nu, model.solid_ratio, hold=hold, stretch_m=stretch)
         progress("spreading the touch", 0.3)
         wide = PatchSampler(self._mesh, float(compliance.patch_width_m[0])).matrix(compliance.points)
         width = min(contact_width(model.tool.tip_radius_m), float(compliance.own_width_m[0]))
