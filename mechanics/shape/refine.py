@@ -94,8 +94,8 @@ def coarse_feet(mesh: TetMesh) -> list[tuple[np.ndarray, float]]:
     base = mesh.surface[:, :3]
     base = base[mesh.fixed[base].all(axis=1)]
     n = len(mesh.points)
-    pairs = base.ravel(), np.roll(base, 1, axis=1).ravel()
-    links = sp.coo_matrix((np.ones(base.size), pairs), shape=(n, n))
+    ends = base.ravel(), np.roll(base, 1, axis=1).ravel()
+    links = sp.coo_matrix((np.ones(base.size), ends), shape=(n, n))
     part = connected_components(links, directed=False)[1][base[:, 0]]
     size, feet = float(np.ptp(mesh.points, axis=0).max()), []
     for each in np.unique(part):
