@@ -108,7 +108,7 @@ def fine_corners(
 def is_fine(mesh: TetMesh, balls: Sequence[Ball], hold: BaseHold | None) -> bool:
     """Whether a mesh serves as it is."""
     fine = typical_edge(mesh) <= surface_edge(mesh) and not coarse_feet(mesh)
-    return fine and not balls and not is_loose(hold)
+    return fine and mesh.shape is None and not balls and not is_loose(hold)
 
 
 def is_loose(hold: BaseHold | None) -> bool:

@@ -16,7 +16,7 @@ from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, touch_site
 from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
-from palpate.mechanics.shape.refine import feet_key
+from palpate.mechanics.shape.refine import refinement_key
 
 VERSION = 12
 UNIFORM = "uniform solver"
@@ -151,7 +151,7 @@ def _stored(
     key = content_key(
         name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, model.element_ratio,
         "" if mesh.shape is None else mesh.shape.key,
-        model.material.poisson_ratio, point, normal, *feet_key(mesh),
+        model.material.poisson_ratio, point, normal, *refinement_key(mesh),
         *([model.tool.tip_radius_m] if np.ptp(model.element_ratio) > 0 else []),
         *([] if skin is None else [skin.thickness_m, skin.modulus_ratio]),
     )  # fmt: skip

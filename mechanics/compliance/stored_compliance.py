@@ -24,7 +24,7 @@ from palpate.mechanics.errors import CacheError
 from palpate.mechanics.model.material import with_balls
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
-from palpate.mechanics.shape.refine import feet_key
+from palpate.mechanics.shape.refine import refinement_key
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 LARGEST_DENSE_BYTES = 1.5e8
@@ -52,7 +52,7 @@ def compliance_key(model: Model, *, dense: bool = False) -> str:
         model.mesh.fixed,
         model.mesh.touchable,
         "" if model.mesh.shape is None else model.mesh.shape.key,
-        *feet_key(model.mesh),
+        *refinement_key(model.mesh),
         material.poisson_ratio,
         model.ratio_without_balls,
         *(() if hold is None else dataclasses.astuple(hold)),

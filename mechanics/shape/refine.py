@@ -8,7 +8,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from palpate.mechanics.shape.nearest import closest, first_hits, sample, triangle_areas
-from palpate.mechanics.shape.tetmesh import EDGES, TetMesh
+from palpate.mechanics.shape.tetmesh import EDGES, TetMesh, tet_volumes
+from palpate.mechanics.shape.true_shape import TrueShape
 from palpate.mechanics.statistics import weighted_median
 
 MOST_TETRAHEDRA = 50_000
@@ -16,6 +17,8 @@ MOST_TETRAHEDRA = 50_000
 rounds, the force in the middle of the top 0.3 % off, 10 mm from a rim 2.8 %."""
 _RAYS, _ITSELF = 200, 1e-6
 """Of a thickness; and how far, of the size, a ray starts from what it leaves."""
+_LEAST_VOLUME = 0.25
+"""A node goes no further to the shape than leaves its tetrahedra this share of their volume."""
 _STANDS, _FINEST_FOOT = 1 / 3, 1 / 8
 """Edges of a foot over its width: by how much narrower it is than the object, and at least. A ball on a foot
 a third as wide, whose base had 12 triangles, gave way 8 % too little: it turns about the foot's outline,
@@ -49,10 +52,11 @@ def refined_near_surface(mesh: TetMesh, surface_edge_m: float) -> tuple[TetMesh,
 
     Every edge longer than that with an end on the touchable surface is halved, as often as it takes and
     MOST_TETRAHEDRA allow: on a larger object the edges stay longer. Then those of `coarse_feet`.
-    parent: (m,) the tetrahedron of `mesh` that each new one lies in. Nodes of the linear mesh keep their
-    place at the front. Shape and base stay as they are: new nodes lie on straight edges.
+    parent: (m,) the tetrahedron of `mesh` that each new one lies in. Nodes of the linear mesh stay at the
+    front. New nodes lie on straight edges; where the shape is known all touchable ones are drawn to it: on
+    chords a fillet of 12 mm under edges of 12 mm gave way 2 % more, and two meshes were 2 % apart.
     """
-    mesh = mesh.linear()
+    shape, mesh = mesh.shape, mesh.linear()
     parent = np.arange(len(mesh.tetrahedra))
     for _ in range(4):
         if typical_edge(mesh) <= surface_edge_m:
@@ -64,7 +68,7 @@ def refined_near_surface(mesh: TetMesh, surface_edge_m: float) -> tuple[TetMesh,
             break
         mesh, parent = finer, parent[step]
     finer, step = refined_at_feet(mesh)
-    return finer, parent[step]
+    return drawn_to_shape(finer, shape), parent[step]
 
 
 def refined_at_feet(mesh: TetMesh) -> tuple[TetMesh, np.ndarray]:
@@ -111,9 +115,41 @@ def coarse_feet(mesh: TetMesh) -> list[tuple[np.ndarray, float]]:
     return feet
 
 
-def feet_key(mesh: TetMesh) -> tuple[float, ...]:
-    """Of what is kept that hangs on how feet are refined: nothing where none is."""
-    return tuple(edge_m for _, edge_m in coarse_feet(mesh))
+def refinement_key(mesh: TetMesh) -> tuple[str | float, ...]:
+    """Of what is kept that hangs on how feet are refined and on a shape: nothing where there is neither."""
+    drawn = () if mesh.shape is None else ("drawn",)
+    return (*drawn, *(edge_m for _, edge_m in coarse_feet(mesh)))
+
+
+def drawn_to_shape(mesh: TetMesh, shape: TrueShape | None) -> TetMesh:
+    """The linear mesh with its touchable nodes on its shape, as far as its elements stay sound; as it is
+    where none is known."""
+    if shape is None:
+        return mesh
+    nodes = np.unique(mesh.touchable_surface)
+    nodes = nodes[~mesh.fixed[nodes]]
+    points = moved_soundly(mesh.points, nodes, shape.foot(mesh.points[nodes])[0], mesh.tetrahedra)
+    return TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable)
+
+
+def moved_soundly(points: np.ndarray, nodes: np.ndarray, to: np.ndarray, tets: np.ndarray) -> np.ndarray:
+    """(n, 3) m, points with `nodes` (k,) moved `to` (k, 3), or as far as their tetrahedra keep
+    _LEAST_VOLUME."""
+    mine = np.zeros(len(points), dtype=bool)
+    mine[nodes] = True
+    near = tets[mine[tets].any(axis=1)]
+    before, share = tet_volumes(points, near), np.zeros(len(points))
+    share[nodes] = 1.0
+    way = np.zeros_like(points)
+    way[nodes] = to - points[nodes]
+    for _ in range(8):
+        moved = points + share[:, None] * way
+        bad = tet_volumes(moved, near) < _LEAST_VOLUME * before
+        if not bad.any():
+            return moved
+        back = np.unique(near[bad])
+        share[back] = np.where(share[back] > 0.2, share[back] - 0.25, 0.0)
+    return points
 
 
 def refined_around(
