@@ -30,7 +30,7 @@ from palpate.mechanics.model.material import Ball
 from palpate.mechanics.plausible import USUAL_TIP_RADIUS_M
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import closest, facings
-from palpate.mechanics.shape.refine import typical_edge
+from palpate.mechanics.shape.refine import coarse_feet, typical_edge
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 
 _SAME_FACE = np.cos(np.radians(40))
@@ -108,7 +108,8 @@ def fine_corners(
 
 def is_fine(mesh: TetMesh, balls: Sequence[Ball], hold: BaseHold | None) -> bool:
     """Whether a mesh serves as it is."""
-    return typical_edge(mesh) <= surface_edge(mesh) and not balls and not is_loose(hold)
+    fine = typical_edge(mesh) <= surface_edge(mesh) and not coarse_feet(mesh)
+    return fine and mesh.shape is None and not balls and not is_loose(hold)
 
 
 def is_loose(hold: BaseHold | None) -> bool:

@@ -27,7 +27,6 @@ def given_back(
     nu, tip = model.material.poisson_ratio, model.tool.tip_radius_m
     softness = surface_softness(model.mesh, model.surface_ratio, points, tip)
     own = softness[:, None, None]
-    half, skinned = half_space_compliance(normals, nu, width_m), 0.0
-    if model.stretch_m:
-        skinned = half_space_change(normals, nu, width_m, model.stretch_m)
+    half = half_space_compliance(normals, nu, width_m)
+    skinned = half_space_change(normals, nu, width_m, model.stretch_m)
     return softness, (1 - own) * half - own * skinned

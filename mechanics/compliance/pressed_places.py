@@ -16,6 +16,7 @@ from palpate.mechanics.compliance.sites import LoadPatch, TouchSites, touch_site
 from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
+from palpate.mechanics.shape.refine import refinement_key
 
 VERSION = 12
 UNIFORM = "uniform solver"
@@ -151,7 +152,7 @@ def _stored(
     key = content_key(
         name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, ratio,
         "" if mesh.shape is None else mesh.shape.key,
-        model.material.poisson_ratio, point, normal,
+        model.material.poisson_ratio, point, normal, *refinement_key(mesh),
         *([model.tool.tip_radius_m] if np.ptp(ratio) > 0 else []),
         *([model.stretch_m] if model.stretch_m else []),
     )  # fmt: skip

@@ -23,6 +23,7 @@ from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import CacheError
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.refine import refinement_key
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 LARGEST_DENSE_BYTES = 1.5e8
@@ -50,6 +51,7 @@ def compliance_key(model: Model, *, dense: bool = False) -> str:
         model.mesh.fixed,
         model.mesh.touchable,
         "" if model.mesh.shape is None else model.mesh.shape.key,
+        *refinement_key(model.mesh),
         material.poisson_ratio,
         model.surface_ratio,
         *([model.stretch_m] if model.stretch_m else []),

@@ -11,6 +11,7 @@ import numpy as np
 from palpate.mechanics.elastic.elasticity import shape_derivatives
 from palpate.mechanics.errors import MeshError
 from palpate.mechanics.shape.nearest import Closest
+from palpate.mechanics.shape.refine import moved_soundly
 from palpate.mechanics.shape.tetmesh import EDGES, FACES, TetMesh, lone_faces, tet_volumes
 from palpate.mechanics.shape.true_shape import TrueShape
 
@@ -43,8 +44,6 @@ GAUSS[np.arange(4), np.arange(4)] = 0.5854101966249685
 """Barycentric points of the four-point rule, each of a quarter of the weight; exact for quadratics."""
 
 _MOST_ROUNDS, _MOST_TETRAHEDRA = 200, 150_000
-_LEAST_VOLUME = 0.25
-"""A node goes no further to the surface than leaves its tetrahedra this share of their volume."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def drawn_to(mesh: TetMesh, surface: CurvedSurface | None) -> TetMesh:
         return mesh
     shell = np.unique(mesh.touchable_surface)
     shell = shell[~mesh.fixed[shell]]
-    points = _moved(mesh.points, shell, surface.nearest(mesh.points[shell]), mesh.tetrahedra)
+    points = moved_soundly(mesh.points, shell, surface.nearest(mesh.points[shell]), mesh.tetrahedra)
     return TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable)
 
 
@@ -153,32 +152,13 @@ def _bisected(
     points = np.vstack([points, (points[a] + points[b]) / 2])
     if surface is not None and on_shell.any():
         new = n + np.flatnonzero(on_shell)
-        points = _moved(points, new, surface.nearest(points[new]), tets)
+        points = moved_soundly(points, new, surface.nearest(points[new]), tets)
     return points, tets, np.concatenate([fixed, on_base]), parent
 
 
 def _edge_keys(triangles: np.ndarray, n: int) -> np.ndarray:
     pairs = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     return pairs[:, 0] * np.int64(n) + pairs[:, 1]
-
-
-def _moved(points: np.ndarray, nodes: np.ndarray, to: np.ndarray, tets: np.ndarray) -> np.ndarray:
-    """`points` with `nodes` moved `to` (k, 3), or as far as their tetrahedra keep _LEAST_VOLUME."""
-    mine = np.zeros(len(points), dtype=bool)
-    mine[nodes] = True
-    near = tets[mine[tets].any(axis=1)]
-    before, share = tet_volumes(points, near), np.zeros(len(points))
-    share[nodes] = 1.0
-    way = np.zeros_like(points)
-    way[nodes] = to - points[nodes]
-    for _ in range(8):
-        moved = points + share[:, None] * way
-        bad = tet_volumes(moved, near) < _LEAST_VOLUME * before
-        if not bad.any():
-            return moved
-        back = np.unique(near[bad])
-        share[back] = np.where(share[back] > 0.2, share[back] - 0.25, 0.0)
-    return points
 
 
 def _curved(mesh: TetMesh, faces: np.ndarray, surface: CurvedSurface | None) -> np.ndarray:

@@ -12,6 +12,7 @@ from palpate.mechanics.press_solver.contact import PressContact
 from palpate.mechanics.press_solver.equilibrium import PressPath, Settling
 from palpate.mechanics.press_solver.graded_mesh import CurvedSurface, drawn_to, graded_mesh
 from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.refine import refined_at_feet
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 _LONGEST = 1.3
@@ -90,10 +91,11 @@ class PressSolver:
         options: PressOptions = PressOptions(),
     ) -> None:
         self._surface = None if surface is None else CurvedSurface(*surface)
+        mesh, parent = refined_at_feet(mesh)
         self.mesh = drawn_to(mesh, self._surface)
         self.young_modulus_pa, self.poisson_ratio = float(young_modulus_pa), float(poisson_ratio)
         self.tip_radius_m, self.options = float(tip_radius_m), options
-        self._ratio = np.ones(len(mesh.tetrahedra)) if ratio is None else np.asarray(ratio, dtype=float)
+        self._ratio = np.ones(len(parent)) if ratio is None else np.asarray(ratio, dtype=float)[parent]
 
     def on_surface(self, point: np.ndarray) -> np.ndarray:
         """(3,) m, the felt place nearest to a point (3,) m."""

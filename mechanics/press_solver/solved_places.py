@@ -17,6 +17,7 @@ from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.press_solver.press import LAWS, PressOptions, PressSolver
 from palpate.mechanics.progress import Progress, silent
+from palpate.mechanics.shape.refine import refinement_key
 from palpate.mechanics.shape.tetmesh import TetMesh
 
 DEPTHS = 6
@@ -82,7 +83,7 @@ class SolvedPresses:
         self.tip_radius_m = float(tip_radius_m)
         self._content = (
             "solved place 4", mesh.points, mesh.tetrahedra, mesh.fixed, *surface, ratio, poisson_ratio,
-            tip_radius_m, repr(options),
+            tip_radius_m, repr(options), *refinement_key(mesh),
         )  # fmt: skip
         self.solver = PressSolver(
             mesh, surface, young_modulus_pa=1.0, poisson_ratio=poisson_ratio, tip_radius_m=tip_radius_m,

@@ -106,7 +106,10 @@ def _widths(
     return width
 
 
-def corner_normals_of(vertices: np.ndarray, triangles: np.ndarray, facets: Facets) -> np.ndarray:
+def corner_normals_of(
+    vertices: np.ndarray, triangles: np.ndarray, facets: Facets
+) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 3, 3) unit normals; (m, 3) bool, where a corner is the tip of a cone."""
     m = len(triangles)
     rows, columns, plane = [], [], np.zeros(3 * m, dtype=bool)
     for edge in range(3):
@@ -138,7 +141,8 @@ def corner_normals_of(vertices: np.ndarray, triangles: np.ndarray, facets: Facet
     np.maximum.at(turn, group[r], angle_between(facets.unit[r // 3], facets.unit[c // 3]))
     tip = angle_between(normals, facets.unit[:, None]) > _APEX_TURNS * turn[group].reshape(m, 3)
     lift = np.maximum(*(np.abs(np.einsum("mcx,mcx->mc", side, normals)) for side in (after, before)))
-    return np.where((tip & (lift / 4 > _CREASE_SAG_M))[..., None], facets.unit[:, None], normals)
+    tip &= lift / 4 > _CREASE_SAG_M
+    return np.where(tip[..., None], facets.unit[:, None], normals), tip
 
 
 _SAME_SIDE = np.cos(np.radians(50))
@@ -173,6 +177,10 @@ class TrueShape:
     @cached_property
     def corner_normals(self) -> np.ndarray:
         """(m, 3, 3) unit outward normals of the curved shape at each triangle's corners."""
+        return self._corners[0]
+
+    @cached_property
+    def _corners(self) -> tuple[np.ndarray, np.ndarray]:
         return corner_normals_of(self.vertices, self.triangles, self._facets)
 
     @cached_property
@@ -183,7 +191,8 @@ class TrueShape:
         return np.unique(pairs, axis=0)
 
     def crease_points(self, spacing_m: float) -> np.ndarray:
-        """(k, 3) m along all creases, at most `spacing_m` apart, none where the shape is smooth."""
+        """(k, 3) m along all creases, at most `spacing_m` apart, and the tips of cones; none where the shape
+        is smooth."""
         triangle, edge = np.nonzero(self._facets.crease)
         p = self.vertices[self.triangles[triangle]]
         rows = np.arange(len(triangle))
@@ -195,7 +204,8 @@ class TrueShape:
         weights = np.zeros((len(row), 3))
         weights[np.arange(len(row)), edge[row]] = 1 - share
         weights[np.arange(len(row)), (edge[row] + 1) % 3] += share
-        return self.on(triangle[row], weights)[0]
+        tips = np.unique(self.triangles[self._corners[1]])
+        return np.vstack([self.on(triangle[row], weights)[0], self.vertices[tips]])
 
     def creases_cut(self, longest_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Creases in straight pieces of at most `longest_m`: middles (k, 3) m, lengths (k,) m, by what angle
