@@ -42,7 +42,9 @@ LEAST_FLATNESS = 0.9
 def solver_of(model: Model) -> Solver:
     """The solver of touches on the model, balls and all."""
     balls = tuple(model.material.inclusions.values())
-    return touch_solver(model.mesh, model.material.poisson_ratio, model.ratio_without_balls, balls=balls)
+    return touch_solver(
+        model.mesh, model.material.poisson_ratio, model.ratio_without_balls, balls=balls, few_loads=True
+    )
 
 
 def palpate_model(

@@ -106,12 +106,14 @@ def touch_solver(
     balls: Sequence[Ball] = (),
     surface_edge_m: float | None = None,
     hold: BaseHold | None = None,
+    few_loads: bool = False,
 ) -> Solver:
     """A solver fit for touches: quadratic, the surface's elements halved until they are small enough.
 
     A patch as narrow as the contact needs them; with wider ones, places near an edge or the base come out 3
     to 5 % too soft. Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
     `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out.
+    few_loads: see Solver; not where it is kept (`factorised_once`).
     """
     corners, edge_m = mesh.linear(), surface_edge_m or surface_edge(mesh)
     ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
@@ -119,7 +121,7 @@ def touch_solver(
         ratio = None
     made = _made.get()
     if made is None:
-        return _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold)
+        return _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold, few_loads)
     key = content_key(
         corners.points, corners.tetrahedra, corners.fixed, corners.touchable,
         "" if mesh.shape is None else mesh.shape.key,
@@ -127,7 +129,7 @@ def touch_solver(
     )  # fmt: skip
     if key not in made:
         made.clear()
-        made[key] = _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold)
+        made[key] = _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold, few_loads=False)
     return made[key]
 
 
@@ -138,6 +140,7 @@ def _factorised(
     edge_m: float,
     balls: Sequence[Ball],
     hold: BaseHold | None,
+    few_loads: bool,
 ) -> Solver:
     fine, parent = refined_near_surface(mesh, edge_m)
     for ball in balls:
@@ -147,7 +150,7 @@ def _factorised(
         ratio = ratio[parent]
     if balls:
         ratio = with_balls(fine, ratio, balls)
-    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold)
+    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold, few_loads=few_loads)
 
 
 @contextmanager
