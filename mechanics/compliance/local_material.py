@@ -11,14 +11,17 @@ A layer bonded to a half-space answers a wave of the load in closed form (Burmis
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from palpate.mechanics.compliance.near_field import surface_softness
 from palpate.mechanics.compliance.patch import half_space_compliance
 from palpate.mechanics.model.material import Skin
 from palpate.mechanics.model.model import Model
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 _RADII = np.geomspace(0.02, 20.0, 32)
 """Contact radii, in thicknesses, at which a punch is solved; what a skin adds to wider ones falls with the
@@ -50,6 +53,8 @@ def _waves() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 @lru_cache(maxsize=64)
 def _punch(modulus_ratio: float, poisson_ratio: float) -> CubicSpline:
     """The modulus under a punch over that of the half-space, by the logarithm of _RADII."""
+    from scipy.interpolate import CubicSpline  # here: what has no skin needs none
+
     weight, wave, cosines, share = _waves()
     beyond = (layer_softness(wave, modulus_ratio, poisson_ratio) - 1) * share
     kernel = 2 / np.pi * _RADII[:, None, None] * ((cosines * beyond) @ cosines.transpose(0, 2, 1))
