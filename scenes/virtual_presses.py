@@ -43,12 +43,9 @@ def solver_of(model: Model) -> Solver:
     """The solver of touches on the model, balls and all."""
     balls = tuple(model.material.inclusions.values())
     return touch_solver(
-        model.mesh,
-        model.material.poisson_ratio,
-        model.surface_ratio,
-        balls=balls,
-        stretch_m=model.stretch_m,
-    )
+        model.mesh, model.material.poisson_ratio, model.surface_ratio, balls=balls,
+        stretch_m=model.stretch_m, few_loads=True,
+    )  # fmt: skip
 
 
 def palpate_model(

@@ -15,16 +15,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
-from scipy.interpolate import RegularGridInterpolator
 from scipy.special import j0, j1
 
 from palpate.mechanics.compliance.far_field import EnergyFields, energy_fields, load_sampler
 from palpate.mechanics.compliance.near_field import BALL_DEPTHS, contact_width
 from palpate.mechanics.compliance.pressed_places import Places
 from palpate.mechanics.shape.tetmesh import EDGES
+
+if TYPE_CHECKING:
+    from scipy.interpolate import RegularGridInterpolator
 
 _CORNER = 0.5854
 """Weight of its own corner in each of the four points of a tetrahedron (second-order quadrature)."""
@@ -133,6 +136,8 @@ def half_space_density(distance: np.ndarray, deep: np.ndarray, width: float) -> 
 @cache
 def _table() -> RegularGridInterpolator:
     """Logarithm of the density, by that of the distance in widths and the angle from the axis."""
+    from scipy.interpolate import RegularGridInterpolator  # here: a touch needs no energies
+
     far = np.geomspace(_NEAREST, _FARTHEST, 70)
     angle = np.linspace(0.0, 0.5 * np.pi * _FLATTEST, 25)
     r, z = (far[:, None] * f(angle) for f in (np.sin, np.cos))

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance
@@ -145,6 +144,8 @@ def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30,
 def far_under_skin(places: Places, stretch_m: float) -> np.ndarray:
     """(p, 3, 3) 1/m, change of the far field by a membrane on the surface (mechanics.elastic.membrane), no
     wider than STRETCHES_M: smooth between factorisations."""
+
+    from scipy.interpolate import CubicSpline  # here: what has no skin needs none
 
     def solve() -> dict[str, np.ndarray]:
         mesh, fields = places.model.mesh.quadratic(), energy_fields(places)

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
 from palpate.mechanics.statistics import matern_5_2
@@ -233,6 +232,8 @@ def _searched(
 ) -> tuple[float, tuple[float, ...]]:
     """(log likelihood, (log_sd, scatter) or (scatter,)) at its greatest; restricted, so that the level is
     free."""
+    from scipy.optimize import minimize  # here: to render a field needs none
+
     field = len(start) == 2
     limits = [np.log(_SD_LIMITS)] * field + [np.log(_SCATTER_LIMITS)]
 

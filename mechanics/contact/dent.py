@@ -19,7 +19,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from palpate.mechanics.errors import OptionError
 from palpate.mechanics.kernels import kernel
@@ -128,6 +127,8 @@ def slipping(name: str, poisson_ratio: float, friction: float) -> np.ndarray:
     """
     if friction >= GRIPS:
         return np.ones(_STEPS + 1)
+    from scipy.interpolate import PchipInterpolator  # here: a tip that sticks needs none
+
     ratios, frictions, shares = _slip_shares()
     between = np.clip((poisson_ratio - ratios[0]) / (ratios[1] - ratios[0]), 0.0, 1.0)
     share = (1 - between) * shares[0] + between * shares[1]

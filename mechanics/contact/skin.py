@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.model.material import Skin
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 TABLE = Path(__file__).with_name("dent_skin.csv")
 """Columns thickness / R, ln of the modulus ratio, depth / R, ln of the factor on the force over the ratio's,
@@ -27,6 +30,8 @@ _STEP = 0.05
 @cache
 def _solved() -> tuple[np.ndarray, np.ndarray, CubicSpline]:
     """ln(thickness / R) (t,), ln ratio (m,), and a spline over the first to (m, 2, k), at `grid()`."""
+    from scipy.interpolate import CubicSpline, PchipInterpolator  # here: what has no skin needs none
+
     thickness, ratio, depth, *logs = np.loadtxt(TABLE, delimiter=",", unpack=True)
     thicknesses, ratios = np.unique(thickness), np.unique(ratio)
     curves = np.empty((len(thicknesses), len(ratios), 2, len(grid())))
@@ -44,6 +49,8 @@ def _solved() -> tuple[np.ndarray, np.ndarray, CubicSpline]:
 def _logarithms(log_thickness: float, log_ratio: float) -> np.ndarray:
     """(2, n) ln of the factors at `grid()`. Thinner than was solved they fall with the thickness, thicker
     what is left of the inside does; ratios beyond go on in proportion."""
+    from scipy.interpolate import PchipInterpolator
+
     thicknesses, ratios, curves = _solved()
     within = float(np.clip(log_thickness, thicknesses[0], thicknesses[-1]))
     share = PchipInterpolator(ratios, curves(within))(float(np.clip(log_ratio, ratios[0], ratios[-1])))

@@ -12,7 +12,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import nnls
 
 from palpate.mechanics.disk.schema import FileKey
 from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
@@ -29,6 +28,8 @@ _AT_S = np.geomspace(SHORTEST_S, LONGEST_S, 60)
 
 @lru_cache(maxsize=4096)
 def _weights(exponent: float) -> tuple[float, ...]:
+    from scipy.optimize import nnls  # here: it is half a second
+
     series = np.exp(-_AT_S[:, None] / TAU_S) * _AT_S[:, None] ** exponent
     return tuple(nnls(series, np.ones(len(_AT_S)))[0])
 

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from palpate.mechanics.contact.dent import grid
 from palpate.mechanics.disk.schema import FileKey
@@ -24,6 +24,9 @@ from palpate.mechanics.effects.base import Effect, Keys, Parameter, Scope, uncha
 from palpate.mechanics.effects.hints import SearchHints
 from palpate.mechanics.effects.settings import TouchTerms
 from palpate.mechanics.model.model import Model
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 FAMILY = Path(__file__).parents[1] / "contact" / "dent_stiffening.csv"
 """Columns ratio, depth / R, ln of the factor on the force over ratio, the same of the sideways stiffness."""
@@ -44,6 +47,8 @@ def hardening(excess: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]
 @cache
 def _family() -> PchipInterpolator:
     """asinh(ratio / _SPREAD) to (2, k): ln of the factors over ratio, at mechanics.contact.dent.grid()."""
+    from scipy.interpolate import PchipInterpolator  # here: most materials need none
+
     ratio, x, force, sideways = np.loadtxt(FAMILY, delimiter=",", unpack=True)
     ratios = np.unique(ratio)
     logs = []

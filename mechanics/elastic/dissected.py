@@ -125,10 +125,10 @@ class DissectedFactor:
         which others there are."""
         count = loads.shape[1] // each
         forms = np.zeros((count, each, each))
-        kept = loads[self._kept].toarray()
+        kept = np.ascontiguousarray(loads[self._kept].toarray().T)  # a column's separators side by side
         met = np.zeros((len(self._fronts) + 1, count), dtype=bool)  # the last: what nothing follows
         for k, front in enumerate(self._fronts):
-            met[k] = kept[front.own].any(axis=0).reshape(count, each).any(axis=1)
+            met[k] = kept[:, front.own].reshape(count, -1).any(axis=1)
         for part in self._parts:
             mine = loads[part.rows]
             groups = np.unique(mine.indices // each)
@@ -136,17 +136,17 @@ class DissectedFactor:
                 columns = _spread(groups, each)
                 half, passed = part.factor.forward(mine[:, columns].toarray())
                 forms[groups] += products(half, each)
-                kept[np.ix_(part.border, columns)] += passed
+                _add_at(kept, columns, part.border, passed.T, 1.0)
                 met[part.above, groups] = True
         for k, front in enumerate(self._fronts):
             groups = np.flatnonzero(met[k])
             if len(groups):
                 columns = _spread(groups, each)
-                own = pardiso.in_lanes(kept[front.own][:, columns], lanes=_LANES)
+                own = pardiso.in_lanes(_taken(kept, columns, front.own).T, lanes=_LANES)
                 pardiso.solve_lower(front.lower, own)
                 forms[groups] += products(own[:, : len(columns)], each)
                 passed = pardiso.product(front.below, own)
-                kept[np.ix_(front.border, columns)] -= passed[:, : len(columns)]
+                _add_at(kept, columns, front.border, passed.T, -1.0)
                 met[front.above] |= met[k]
         return forms
 
@@ -174,6 +174,24 @@ def _add(whole, places, update):
     for j in range(len(places)):
         for i in range(j, len(places)):
             whole[places[i], places[j]] += update[i, j]
+
+
+@njit(cache=True)
+def _taken(whole, rows, columns):
+    """(r, c) what stands at rows (r,) and columns (c,)."""
+    values = np.empty((len(rows), len(columns)))
+    for i in range(len(rows)):
+        for j in range(len(columns)):
+            values[i, j] = whole[rows[i], columns[j]]
+    return values
+
+
+@njit(cache=True)
+def _add_at(whole, rows, columns, values, sign):
+    """Add values, or take them off, at rows (r,) and columns (c,); values may hold more rows."""
+    for i in range(len(rows)):
+        for j in range(len(columns)):
+            whole[rows[i], columns[j]] += sign * values[i, j]
 
 
 def products(half: np.ndarray, each: int) -> np.ndarray:

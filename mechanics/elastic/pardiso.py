@@ -264,16 +264,16 @@ class SchurFactor:
     def __init__(self, matrix: sp.csr_matrix, border: sp.csr_matrix, beyond: float) -> None:
         k, b = border.shape
         self._own = k
-        self._beyond = beyond * np.eye(b)
-        upper = sp.bmat([[sp.triu(matrix), border], [None, sp.csr_matrix(self._beyond)]], format="csr")
+        self._beyond = beyond
+        upper = sp.bmat([[sp.triu(matrix), border], [None, beyond * sp.identity(b)]], format="csr")
         upper.sort_indices()
         self._phases = _Phases(upper, np.arange(k, k + b))
         self._left = self._phases.factorise(upper.data)
 
     def taken(self) -> np.ndarray:
         """-B' A^-1 B (b, b), columns contiguous; asked once, and not kept."""
-        taken = self._left - self._beyond
-        self._left = self._beyond = np.zeros((0, 0))
+        taken, self._left = self._left, np.zeros((0, 0))
+        taken[np.diag_indices(len(taken))] -= self._beyond
         return taken.T
 
     def forward(self, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.errors import ModelError
@@ -58,6 +57,8 @@ def spread_law(
         if len(places) == 1:
             values = np.tile(means, (len(at), 1))
         else:
+            from scipy.interpolate import RBFInterpolator  # here: it takes as long to load as a model
+
             values = RBFInterpolator(places, means, kernel="linear", degree=0)(at)
             values = np.clip(values, columns.min(axis=0), columns.max(axis=0))
     force, damping, r, s = values.T

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import uniform_filter1d
 
 MEAN_S = 0.02
 """A reading is averaged over this long: no hand turns faster."""
@@ -50,6 +49,8 @@ def averaged(t: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarra
     Noise and rounding show in second differences, of the slower half of the samples: a motion bends least
     there.
     """
+    from scipy.ndimage import uniform_filter1d  # here: a touch needs no recording
+
     if len(t) < 4:
         return np.array(position, dtype=float), np.zeros(3)
     count = 2 * int(0.5 * MEAN_S / np.median(np.diff(t))) + 1

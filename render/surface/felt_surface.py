@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.sites import TouchSites
@@ -80,6 +79,8 @@ def _from_touches(model: Model, surface: FeltSurface, sites: TouchSites) -> np.n
 
     Radial basis functions as for the 1D renderers' parameters (linear kernel), within the sites' range.
     """
+    from scipy.interpolate import RBFInterpolator  # here: a press of a given shape needs none
+
     far = np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)
     at_sites = np.column_stack([far, sites.curvature])
     scale = np.linalg.norm(np.ptp(surface.points, axis=0))

@@ -33,6 +33,16 @@ def test_to_import_reconstruct_press_and_diagnose_needs_no_vtk_and_no_matplotlib
     assert "palpate" in tops and not tops & {"vtk", "vtkmodules", "pyvista", "matplotlib"}
 
 
+def test_to_press_a_model_needs_nothing_of_scipy_that_fits_or_filters():
+    """They took a second of every press."""
+    names = loaded(
+        "import json, sys, palpate.operations.press, palpate.show.curve, palpate.render.exact\n"
+        "import palpate.render.fem.renderer, palpate.render.force_error, palpate.render.press"
+    )
+    assert "scipy.spatial" in names
+    assert not names & {f"scipy.{part}" for part in ("interpolate", "ndimage", "optimize", "signal", "stats")}
+
+
 COMMANDS = {
     "press": "press demo --at 0,0,0.08 --depth 0.003 --json press.json",
     "reconstruct": "reconstruct silicone-1-cylinder -o MODEL --json made.json",
