@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         model = _model(Path(folder) / "organ.stl", arguments.mesh_size)
         began = time.process_time()
-        solved = load_or_solve(model, few_loads=False)
+        solved = load_or_solve(model)
         assert isinstance(solved, OnDemandCompliance), "nobody touched it before"
         solved.solve(first_places(solved.own_points))
         coarse = CoarseCompliance(solved)

@@ -44,7 +44,7 @@ def solver_of(model: Model) -> Solver:
     balls = tuple(model.material.inclusions.values())
     return touch_solver(
         model.mesh, model.material.poisson_ratio, model.surface_ratio, balls=balls,
-        stretch_m=model.stretch_m, few_loads=True,
+        stretch_m=model.stretch_m,
     )  # fmt: skip
 
 

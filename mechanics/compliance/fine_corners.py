@@ -90,10 +90,9 @@ def fine_corners(
     stretch_m: float = 0.0,
     tip_radius_m: float = USUAL_TIP_RADIUS_M,
     solver: Solver | None = None,
-    few_loads: bool = False,
 ) -> FineCorners:
-    """Factorise the fine mesh, or take the mesh's own solver where that `is_fine`. few_loads: see Solver.
-    The others: see `surface_compliance`."""
+    """Factorise the fine mesh, or take the mesh's own solver where that `is_fine`. The others: see
+    `surface_compliance`."""
     if solver is None and is_fine(mesh, balls, hold):
         solver = Solver(
             mesh.quadratic(),
@@ -101,7 +100,6 @@ def fine_corners(
             modulus_ratio,
             hold=hold,
             stretch_m=stretch_m,
-            few_loads=few_loads,
         )
     elif solver is None:
         solver = touch_solver(
@@ -111,7 +109,6 @@ def fine_corners(
             balls=balls,
             hold=hold,
             stretch_m=stretch_m,
-            few_loads=few_loads,
         )
     nodes, triangles = corners_of(solver.mesh)
     # with balls `ball_law` takes what they add under narrower loads

@@ -1,8 +1,7 @@
 """The compliance of an object where it is asked for: solved place by place, kept beside the MODEL.
 
-What is solved are entries of the table of mechanics.compliance.surface_compliance, and stay in it when it is
-made. A few of a large mesh (mechanics.elastic.solver.LARGE) are solved on a cheaper factor, and differ from a
-table made from nothing by rounding. There is no table between places: one tip needs none.
+What is solved are entries of the table of mechanics.compliance.surface_compliance, to the bit. There is no
+table between places: one tip needs none.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ from palpate.mechanics.compliance.fine_corners import (
 from palpate.mechanics.compliance.patch import PatchSampler
 from palpate.mechanics.compliance.sites import patch_width
 from palpate.mechanics.disk.store import read_arrays, write_arrays
-from palpate.mechanics.elastic.solver import FEW_PLACES, Solver
+from palpate.mechanics.elastic.solver import Solver
 from palpate.mechanics.errors import CacheError
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.nearest import closest
@@ -43,10 +42,9 @@ class OnDemandCompliance:
     SurfaceCompliance, the last two of no size; own: (v, 3, 3), own_bracing: (v,) 1/m, NaN where nothing was
     asked for yet.
 
-    key: of all that the numbers depend on. fine: factorises, for few loads or many, or takes a solver; called
-    when something is to be solved, and what it gives is kept for the last object alone. coarse: factorises
-    the mesh itself. path: of the file that keeps what was solved, or None. few_loads: unless more is asked
-    for.
+    key: of all that the numbers depend on. fine: factorises; called when something is to be solved, and what
+    it gives is kept for the last object alone. coarse: factorises the mesh itself. path: of the file that
+    keeps what was solved, or None.
     """
 
     blocks, factor = _NO_BLOCKS, _NO_FACTOR
@@ -55,20 +53,17 @@ class OnDemandCompliance:
         self,
         mesh: TetMesh,
         poisson_ratio: float,
-        fine: Callable[[bool, Solver | None], FineCorners],
+        fine: Callable[[], FineCorners],
         coarse: Callable[[], Solver],
         key: str,
         path: Path | None,
-        *,
-        few_loads: bool = True,
     ) -> None:
         self.nodes = corners_of(mesh.quadratic())[0]
         self.poisson_ratio = np.array([float(poisson_ratio)])
         self._make_fine, self._make_coarse, self._key, self._path = fine, coarse, key, path
-        self._room = FEW_PLACES if few_loads else -1
         arrays = self._kept()
         if not arrays:
-            made = self._fine()
+            made = self._fine
             own, width = np.full((len(made.points), 3, 3), np.nan), np.array([made.width_m])
             new = (made.points, made.normals, made.triangles, width, own, own[:, 0, 0])
             arrays = dict(zip(_KEPT, new, strict=True))
@@ -110,13 +105,12 @@ class OnDemandCompliance:
         loads = unit_loads(average[corner : corner + 1])[:, :, 0] @ np.asarray(force, dtype=float)
         return average @ solver.solve(loads)
 
+    @property
     def _fine(self) -> FineCorners:
-        """For as many loads as are still to be expected."""
-        few = self._room >= 0
-        if self._key not in _last or (_last[self._key][1] and not few):
+        if self._key not in _last:
             _last.clear()
-            _last[self._key] = self._make_fine(few, None), few
-        return _last[self._key][0]
+            _last[self._key] = self._make_fine()
+        return _last[self._key]
 
     @cached_property
     def _edges(self) -> EdgeMiddles:
@@ -134,19 +128,12 @@ class OnDemandCompliance:
         sampler = PatchSampler(solver.mesh, patch_width(solver.mesh))
         return solver, sampler.matrix(solver.mesh.points[self.nodes])
 
-    def solve(
-        self, corners: np.ndarray, progress: Progress = silent, *, solver: Solver | None = None
-    ) -> None:
-        """Solve those of the corners that are not solved yet, and keep them. solver: of the mesh, where it
-        `is_fine` and factorised for many loads."""
+    def solve(self, corners: np.ndarray, progress: Progress = silent) -> None:
+        """Solve those of the corners that are not solved yet, and keep them."""
         new = corners[np.isnan(self.own[corners, 0, 0])]
         if not len(new):
             return
-        self._room -= len(new)
-        if solver is not None:
-            _last.clear()
-            _last[self._key] = self._make_fine(False, solver), False
-        self.own[new], self.own_bracing[new] = self._fine().own(new, progress)
+        self.own[new], self.own_bracing[new] = self._fine.own(new, progress)
         kept = self._kept()
         if kept:  # what another process added meanwhile
             more = np.isnan(self.own[:, 0, 0]) & ~np.isnan(kept["own"][:, 0, 0])
@@ -169,9 +156,9 @@ class OnDemandCompliance:
             return {}
 
 
-_last: dict[str, tuple[FineCorners, bool]] = {}
-"""The factorisation of the last object that something was solved of, and whether it is for few loads: who
-presses it again waits for the solves alone."""
+_last: dict[str, FineCorners] = {}
+"""The factorisation of the last object that something was solved of: who presses it again waits for the
+solves alone."""
 
 _unwritten: dict[str, dict[str, np.ndarray]] = {}
 """What was solved of the last object that has no file."""

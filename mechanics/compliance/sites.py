@@ -107,14 +107,13 @@ def touch_solver(
     surface_edge_m: float | None = None,
     hold: BaseHold | None = None,
     stretch_m: float = 0.0,
-    few_loads: bool = False,
 ) -> Solver:
     """A solver fit for touches: quadratic, the surface's elements halved until they are small enough.
 
     A patch as narrow as the contact needs them; with wider ones, places near an edge or the base come out 3
     to 5 % too soft. Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
     `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out. stretch_m:
-    of a skin (mechanics.elastic.membrane). few_loads: see Solver; not where it is kept (`factorised_once`).
+    of a skin (mechanics.elastic.membrane).
     """
     corners, edge_m = mesh.linear(), surface_edge_m or surface_edge(mesh)
     ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
@@ -122,7 +121,7 @@ def touch_solver(
         ratio = None
     made = _made.get()
     if made is None:
-        return _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold, stretch_m, few_loads)
+        return _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold, stretch_m)
     key = content_key(
         corners.points, corners.tetrahedra, corners.fixed, corners.touchable,
         "" if mesh.shape is None else mesh.shape.key,
@@ -131,9 +130,7 @@ def touch_solver(
     )  # fmt: skip
     if key not in made:
         made.clear()
-        made[key] = _factorised(
-            corners, poisson_ratio, ratio, edge_m, balls, hold, stretch_m, few_loads=False
-        )
+        made[key] = _factorised(corners, poisson_ratio, ratio, edge_m, balls, hold, stretch_m)
     return made[key]
 
 
@@ -145,7 +142,6 @@ def _factorised(
     balls: Sequence[Ball],
     hold: BaseHold | None,
     stretch_m: float,
-    few_loads: bool,
 ) -> Solver:
     fine, parent = refined_near_surface(mesh, edge_m)
     for ball in balls:
@@ -155,7 +151,7 @@ def _factorised(
         ratio = ratio[parent]
     if balls:
         ratio = with_balls(fine, ratio, balls)
-    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold, stretch_m=stretch_m, few_loads=few_loads)
+    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold, stretch_m=stretch_m)
 
 
 @contextmanager

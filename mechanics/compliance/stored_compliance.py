@@ -7,6 +7,7 @@ interpolates (mechanics.compliance.surface_compliance).
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -107,11 +108,9 @@ def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompli
     return SurfaceCompliance.from_arrays(_unwritten[key])
 
 
-def load_or_solve(
-    model: Model, progress: Progress = silent, *, few_loads: bool = True
-) -> SurfaceCompliance | OnDemandCompliance:
+def load_or_solve(model: Model, progress: Progress = silent) -> SurfaceCompliance | OnDemandCompliance:
     """The compliance of a model for one tip on few places: condensed where it is so already, else place by
-    place as it is asked for. few_loads: False where all of them will be (OnDemandCompliance).
+    place as it is asked for; both give the same bits.
 
     A base that is loose in part is condensed: which of its places rest on the floor is found from place to
     place over the whole surface.
@@ -121,7 +120,7 @@ def load_or_solve(
         return condensed
     if is_loose(_hold(model)):
         return load_or_condense(model, progress)
-    return _on_demand(model, few_loads)
+    return _on_demand(model)
 
 
 def fills(model: Model) -> bool:
@@ -158,7 +157,7 @@ def _places_of(model: Model) -> tuple[str, Path | None]:
     return key, None if model.path is None else model.path / f"places-{key[:16]}.bin"
 
 
-def _on_demand(model: Model, few_loads: bool = True) -> OnDemandCompliance:
+def _on_demand(model: Model) -> OnDemandCompliance:
     hold = _hold(model)
     mesh, nu, ratio = model.mesh, model.material.poisson_ratio, model.surface_ratio
     balls = tuple(model.material.inclusions.values())
@@ -167,21 +166,10 @@ def _on_demand(model: Model, few_loads: bool = True) -> OnDemandCompliance:
     return OnDemandCompliance(
         mesh,
         nu,
-        lambda few, solver: fine_corners(
-            mesh,
-            nu,
-            ratio,
-            balls=balls,
-            hold=hold,
-            stretch_m=stretch,
-            tip_radius_m=tip,
-            solver=solver,
-            few_loads=few,
-        ),  # fmt: skip
+        partial(fine_corners, mesh, nu, ratio, balls=balls, hold=hold, stretch_m=stretch, tip_radius_m=tip),
         lambda: Solver(mesh.quadratic(), nu, model.solid_ratio, hold=hold, stretch_m=stretch),
         key,
         path,
-        few_loads=few_loads,
     )
 
 

@@ -149,7 +149,7 @@ def surface_compliance(
         width = max(width, WIDE_PATCH_M)
         blocks = np.zeros((0, 0, 3, 3), dtype=np.float32)
         tables["factor"] = compress(coarse, points, width, tolerance=low_rank_error, progress=progress).factor
-    serves = coarse if is_fine(mesh, balls, hold) else None
+    serves = coarse if solved is None and is_fine(mesh, balls, hold) else None
     del coarse
     if solved is None:
         fine = fine_corners(
@@ -159,7 +159,7 @@ def surface_compliance(
         (own, bracing), own_width = fine.own(progress=progress), np.array([fine.width_m])
         own_points, own_normals, own_triangles = fine.points, fine.normals, fine.triangles
     else:
-        solved.solve(np.arange(len(solved.own)), progress, solver=serves)
+        solved.solve(np.arange(len(solved.own)), progress)
         own, own_width, bracing = (
             np.array(each) for each in (solved.own, solved.own_width_m, solved.own_bracing)
         )

@@ -20,8 +20,6 @@ from palpate.mechanics.shape.tetmesh import TetMesh
 BACKENDS = ("pardiso", "superlu")
 LARGE = 8_000
 """Nodes from which a mesh is dissected by us: below, that costs more than it saves."""
-FEW_PLACES = 64
-"""Of a large mesh, solved under three loads each: so many are sooner done on the library's own factor."""
 
 
 class Solver:
@@ -29,9 +27,8 @@ class Solver:
 
     modulus_ratio: (m,) or None. backend: 'pardiso', 'superlu' or None for the best that is there.
     local_bulk: see `element_stiffness`. hold: how the base is held; None: bonded. stretch_m: of a skin
-    (mechanics.elastic.membrane). few_loads: of FEW_PLACES at most; a large mesh is then factorised in two
-    thirds of time and memory, and gives the same but for rounding. The factorisation is done in the
-    constructor. Raises MeshError where nothing is fixed (rigid motion).
+    (mechanics.elastic.membrane). The factorisation is done in the constructor. Raises MeshError where nothing
+    is fixed (rigid motion).
     """
 
     def __init__(
@@ -44,7 +41,6 @@ class Solver:
         local_bulk: float = LOCAL_BULK,
         hold: BaseHold | None = None,
         stretch_m: float = 0.0,
-        few_loads: bool = False,
     ) -> None:
         self.mesh = mesh
         self.poisson_ratio = poisson_ratio
@@ -64,10 +60,9 @@ class Solver:
             if springs is not None:
                 full = full + springs.tobsr((3, 3))
         self.matrix = _of_nodes(full, self.free[::3] // 3)
-        del full  # as large as the matrix
         self._factor: Any
         try:
-            if self.backend == "pardiso" and (few_loads or len(self.free) < 3 * LARGE):
+            if self.backend == "pardiso" and len(self.free) < 3 * LARGE:
                 self._factor = pardiso.Pardiso(self.matrix, group=3)
             elif self.backend == "pardiso":
                 self._factor = DissectedFactor(self.matrix)

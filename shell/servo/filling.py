@@ -172,7 +172,7 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
 
     said("factorising the object", 0.0)
     model = read_model(model_path)
-    solved = load_or_solve(model, few_loads=False)
+    solved = load_or_solve(model)
     if not isinstance(solved, OnDemandCompliance):
         return
     first = first_places(solved.own_points)

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from palpate.mechanics.compliance import on_demand
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.stored_compliance import load_or_condense, load_or_solve
 from palpate.mechanics.disk.store import read_arrays
-from palpate.mechanics.elastic import solver
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.material import Ball
 from palpate.mechanics.model.model import Model
@@ -154,21 +152,6 @@ def test_several_tips_and_a_free_hand_have_the_whole_object(lazy):
     assert np.abs(state.forces).max() > 0.01
     # where all is condensed, it is read
     assert not isinstance(load_or_solve(lazy.model), OnDemandCompliance)
-
-
-def test_few_places_of_a_large_mesh_stay_in_its_table_and_many_are_solved_as_it_is(tmp_path, monkeypatch):
-    monkeypatch.setattr(solver, "LARGE", 0)
-    lazy, whole = _both(_model(tmp_path / "few"), 1.0)
-    stroke = ([0.003, 0.002, 0.025], [0, 0, -1], Stroke(1.5e-3, 0.05))
-    before, from_nothing = press(lazy, *stroke).force, press(whole, *stroke).force
-    assert np.abs(before - from_nothing).max() < 1e-9 * np.abs(before).max()
-    after = FemRenderer(lazy.model, lazy.options, compliance=load_or_condense(lazy.model))
-    assert np.array_equal(press(after, *stroke).force, before)
-    # a path over much of the surface
-    many = load_or_solve(_model(tmp_path / "many"))
-    corners = np.arange(on_demand.FEW_PLACES + 1)
-    many.solve(corners)
-    assert np.array_equal(many.own[corners], whole.compliance.own[corners])
 
 
 def test_its_errors_are_those_of_solved_places(lazy):
