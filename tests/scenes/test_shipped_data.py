@@ -71,7 +71,7 @@ def test_places_give_as_they_would_if_they_were_solved_today(model: Model) -> No
     ]
     nu, balls = model.material.poisson_ratio, tuple(model.material.inclusions.values())
     chosen += [int(np.linalg.norm(points - ball.centre_m, axis=1).argmin()) for ball in balls]
-    solver = touch_solver(model.mesh, nu, model.ratio_without_balls, balls=balls)
+    solver = touch_solver(model.mesh, nu, model.surface_ratio, balls=balls)
     patch = LoadPatch(tip_radius_m=model.tool.tip_radius_m, balls=bool(balls))
     solved = touch_sites(model.mesh, points[chosen], normals[chosen], nu, solver=solver, patch=patch)
     kept = compliance.far_at(points[chosen], normals[chosen])
