@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from palpate.mechanics.disk.writing import atomic_file
 from tools.dent_half_space import COARSE, HalfSpace, graded, solved
-from tools.dent_table import Press
+from tools.dent_table import Press, descent
 from tools.script import script
 
 THICKNESSES = (0.06, 0.12, 0.24, 0.48, 0.96, 1.92)
@@ -67,8 +67,15 @@ class LinearPress(Press):
         place = body.points[self.rings[self.stuck]] + self.u[self.rings[self.stuck]]
         return float(np.hypot(place[0], place[1] - (1.0 - depth)) - 1.0)
 
+    def next_ring(self, depth: float) -> float:
+        """As `Press.next_ring`."""
+        touches = super().next_ring(depth)
+        if touches <= depth:
+            raise ArithmeticError("the skin has bulged onto the sphere: no linear body goes there")
+        return touches
+
     def tangential_stiffness(self) -> float:
-        """As `HalfSpace.tangential_stiffness`, of the rings that stick."""
+        """As `Press.tangential_stiffness`."""
         free = np.ones((self.stuck, 3), dtype=bool)
         free[0, 1:] = False
         own = np.flatnonzero(free.ravel())
@@ -98,16 +105,8 @@ def _levels(thickness: float, element: float) -> np.ndarray:
 
 def pressed(body: HalfSpace) -> np.ndarray:
     """(k, 3): depth, force and sideways stiffness (tip radii, modulus 1) as each ring touches."""
-    press, depth, rows, before = LinearPress(body, float(DEPTHS[-1])), 0.0, [], 0.0
-    while depth < DEPTHS[-1] and press.stuck < len(press.rings) - 1:
-        reached, depth = depth, press.next_ring(depth)
-        if depth <= reached:  # a soft skin has bulged onto the sphere: no linear body goes there
-            break
-        # the ring that just touches carries nothing yet: the stick is half way between with and without it
-        sideways = press.tangential_stiffness()
-        rows.append((depth, press.force, 0.5 * (before + sideways)))
-        before = sideways
-    return np.array(rows)
+    way = descent(LinearPress(body, float(DEPTHS[-1])), float(DEPTHS[-1]))
+    return np.array([(depth, force, sideways) for depth, force, _, sideways in way])
 
 
 def logarithms(thickness: float, log_ratio: float) -> np.ndarray:

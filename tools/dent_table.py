@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,7 @@ class Press:
 
     def __init__(self, body: HalfSpace) -> None:
         self.body = body
+        self.rings = body.top
         self.u = np.zeros_like(body.points)
         self.stuck = 1
         self.anchor = np.zeros((len(body.top), 2))  # of stuck rings, relative to the sphere's centre
@@ -76,6 +78,10 @@ class Press:
         self.force = -float(body.forces(u)[0].reshape(-1, 2)[rings, 1].sum())
         place = body.points[body.top[self.stuck]] + u[body.top[self.stuck]]
         return float(np.hypot(place[0], place[1] - (1.0 - depth)) - 1.0)
+
+    def tangential_stiffness(self) -> float:
+        """`HalfSpace.tangential_stiffness`, of the rings that stick."""
+        return self.body.tangential_stiffness(self.u, self.rings[: self.stuck])
 
     def next_ring(self, depth: float) -> float:
         """The depth at which the next ring touches, from `depth`; it sticks from there on."""
@@ -114,23 +120,28 @@ def press_curve(
     A row a ring of the surface, at the depth where it touches.
     """
     body = HalfSpace(element, poisson_ratio, law, until, stiffening, grading)
-    press = Press(body)
-    depth, rows, before = 0.0, [], 0.0
     stick = 4 / ((1 + poisson_ratio) * (2 - poisson_ratio))
-    while depth < until and press.stuck < len(body.top) - 1:
+    rows = []
+    for depth, force, radius, sideways in descent(Press(body), until):
+        rows.append((depth, force * (1 - poisson_ratio**2), radius, sideways / stick))
+        if not quiet:
+            print("".join(f"{value:11.6f}" for value in rows[-1]), flush=True)
+    return np.array(rows)
+
+
+def descent(press: Press, until: float) -> Iterator[tuple[float, float, float, float]]:
+    """Depth, force, contact radius and sideways stiffness, tip radii and modulus 1, as each ring touches."""
+    depth, before = 0.0, 0.0
+    while depth < until and press.stuck < len(press.rings) - 1:
         try:
             depth = press.next_ring(depth)
         except ArithmeticError as error:
             print(f"stopped at depth {depth:.3f} R: {error}")
-            break
-        radius = press.anchor[press.stuck - 1, 0]
+            return
         # the ring that just touches carries nothing yet: the stick is half way between with and without it
-        sideways = body.tangential_stiffness(press.u, body.top[: press.stuck]) / stick
-        rows.append((depth, press.force * (1 - poisson_ratio**2), radius, 0.5 * (before + sideways)))
+        sideways = press.tangential_stiffness()
+        yield depth, press.force, float(press.anchor[press.stuck - 1, 0]), 0.5 * (before + sideways)
         before = sideways
-        if not quiet:
-            print("".join(f"{value:11.6f}" for value in rows[-1]), flush=True)
-    return np.array(rows)
 
 
 def smooth_table(rows: np.ndarray) -> np.ndarray:

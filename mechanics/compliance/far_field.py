@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance
 from palpate.mechanics.compliance.pressed_places import UNIFORM, Places
@@ -37,15 +36,13 @@ _KNOWN = 16
 class EnergyFields:
     """energy: (q, m, 3, 3) of q places, local frames, unit modulus, 1/m. centroid: (m, 3) m, device frame.
 
-    volume: (m,) m^3. depth: (m,) m, distance of the centroid to the touchable surface. half_space: (3, 3)
-    taken off the sum, local frame, under a patch of width_m, m. solver: of the model's own mesh, bonded.
-    solution: (n, 3, 3 q) its nodal displacements for the unit loads.
+    volume: (m,) m^3. half_space: (3, 3) taken off the sum, local frame, under a patch of width_m, m. solver:
+    of the model's own mesh, bonded. solution: (n, 3, 3 q) its nodal displacements for the unit loads.
     """
 
     energy: np.ndarray
     centroid: np.ndarray
     volume: np.ndarray
-    depth: np.ndarray
     half_space: np.ndarray
     width_m: float
     solver: Solver
@@ -109,9 +106,8 @@ def _energies(places: Places) -> EnergyFields:
             "mxqi,mxqj->qmij", local.reshape(len(nodes), 30, q, 3), product, optimize=True
         )
     centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
-    depth = cKDTree(sampler._positions.reshape(-1, 3)).query(centroid)[0]
     half = half_space_compliance(np.array([1.0, 0, 0]), model.material.poisson_ratio, sampler.width_m)
-    return EnergyFields(energy, centroid, mesh.volumes, depth, half, sampler.width_m, solver, u)
+    return EnergyFields(energy, centroid, mesh.volumes, half, sampler.width_m, solver, u)
 
 
 def far_with_weights(places: Places, softness: np.ndarray) -> np.ndarray:
@@ -144,7 +140,6 @@ def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30,
 def far_under_skin(places: Places, stretch_m: float) -> np.ndarray:
     """(p, 3, 3) 1/m, change of the far field by a membrane on the surface (mechanics.elastic.membrane), no
     wider than STRETCHES_M: smooth between factorisations."""
-
     from scipy.interpolate import CubicSpline  # here: what has no skin needs none
 
     def solve() -> dict[str, np.ndarray]:

@@ -94,22 +94,9 @@ def fine_corners(
     """Factorise the fine mesh, or take the mesh's own solver where that `is_fine`. The others: see
     `surface_compliance`."""
     if solver is None and is_fine(mesh, balls, hold):
-        solver = Solver(
-            mesh.quadratic(),
-            poisson_ratio,
-            modulus_ratio,
-            hold=hold,
-            stretch_m=stretch_m,
-        )
+        solver = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, hold=hold, stretch_m=stretch_m)
     elif solver is None:
-        solver = touch_solver(
-            mesh,
-            poisson_ratio,
-            modulus_ratio,
-            balls=balls,
-            hold=hold,
-            stretch_m=stretch_m,
-        )
+        solver = touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold, stretch_m=stretch_m)
     nodes, triangles = corners_of(solver.mesh)
     # with balls `ball_law` takes what they add under narrower loads
     width = patch_width(solver.mesh) if balls else load_width(solver)

@@ -20,9 +20,9 @@ _MIDDLES = 0.5 * (1 - np.eye(3))
 _WAVES = 200
 
 
-def membrane_stiffness(mesh: TetMesh, poisson_ratio: float, stretch_m: np.ndarray) -> sp.csr_matrix:
-    """(3n, 3n) m, what a membrane of stretch lengths (f,) m, one a touchable triangle, adds to the stiffness
-    for unit modulus: plane stress in the triangles' planes, nothing across them."""
+def membrane_stiffness(mesh: TetMesh, poisson_ratio: float, stretch_m: np.ndarray | float) -> sp.csr_matrix:
+    """(3n, 3n) m, what a membrane of stretch lengths (f,) m, one a touchable triangle or one for all, adds to
+    the stiffness for unit modulus: plane stress in the triangles' planes, nothing across them."""
     nu, triangles = poisson_ratio, mesh.touchable_surface
     corners, k = mesh.points[triangles[:, :3]], triangles.shape[1]
     across, normals = facings(mesh.points, triangles)

@@ -45,20 +45,18 @@ class Solver:
         self.mesh = mesh
         self.poisson_ratio = poisson_ratio
         self.hold = hold
-        self.stretch_m = stretch_m
         self.modulus_ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
         self.backend = backend or ("pardiso" if pardiso.available() else "superlu")
         if self.backend not in BACKENDS:
             raise OptionError(f"backend is '{backend}'; allowed are {', '.join(BACKENDS)}")
         self.free = free_dofs(mesh, hold)
         full = stiffness_blocks(mesh, poisson_ratio, modulus_ratio, local_bulk=local_bulk)
-        added = [] if hold is None else [hold.stiffness(mesh)]
+        springs = None if hold is None else hold.stiffness(mesh)
+        if springs is not None:
+            full = full + springs.tobsr((3, 3))
         if stretch_m:
-            ratio = np.ones(len(mesh.tetrahedra)) if self.modulus_ratio is None else self.modulus_ratio
-            added += [membrane_stiffness(mesh, poisson_ratio, stretch_m * ratio[mesh.touchable_elements])]
-        for springs in added:
-            if springs is not None:
-                full = full + springs.tobsr((3, 3))
+            ratio = 1.0 if self.modulus_ratio is None else self.modulus_ratio[mesh.touchable_elements]
+            full = full + membrane_stiffness(mesh, poisson_ratio, stretch_m * ratio).tobsr((3, 3))
         self.matrix = _of_nodes(full, self.free[::3] // 3)
         self._factor: Any
         try:

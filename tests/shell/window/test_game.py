@@ -91,12 +91,13 @@ def test_the_nodule_shows_at_the_depth_that_the_words_name_and_not_under_springs
             assert over > 1.1 * else_
             best = points[np.argmax(np.where(upper, stiffness, 0.0))]
             assert np.hypot(*(best[:2] - NODULE.centre_m[:2])) < NODULE.radius_m, "of the upper half"
-            # all that a hand cannot tell from the stiffest place has the points, but for the last
+            # all that a hand cannot tell from the stiffest place has the points, but for the last tenth:
+            # on a dome the stiffest places lie outward of the middle, where the normal points at it
             alike = points[upper & (stiffness > 0.99 * stiffness[upper].max())]
             for place in alike:
                 game = Game([NODULE], UP)
                 game.follow(0.004, place, 0.0)
-                assert game.answer(0.0, "fem").score > 99.0
+                assert game.answer(0.0, "fem").score > 90.0
     assert shares["fem"] > 0.7 and shares["hunt-crossley"] < 0.45
     words = Game([NODULE], UP).lines(0.0)[0].replace("\u00a0", " ")
     assert f"{1e3 * PRESS_M:g} mm" in words and "of the upper half" in words, "the foot is stiffer still"
