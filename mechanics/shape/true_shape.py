@@ -190,9 +190,9 @@ class TrueShape:
         pairs = np.sort(ends[self._facets.crease], axis=1)
         return np.unique(pairs, axis=0)
 
-    def crease_points(self, spacing_m: float) -> np.ndarray:
-        """(k, 3) m along all creases, at most `spacing_m` apart, and the tips of cones; none where the shape
-        is smooth."""
+    def crease_points(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        """Points (k, 3) m along all creases, at most `spacing_m` apart, and the tips of cones, once for each
+        face that ends there, with its unit normals (k, 3); none where the shape is smooth."""
         triangle, edge = np.nonzero(self._facets.crease)
         p = self.vertices[self.triangles[triangle]]
         rows = np.arange(len(triangle))
@@ -204,8 +204,11 @@ class TrueShape:
         weights = np.zeros((len(row), 3))
         weights[np.arange(len(row)), edge[row]] = 1 - share
         weights[np.arange(len(row)), (edge[row] + 1) % 3] += share
-        tips = np.unique(self.triangles[self._corners[1]])
-        return np.vstack([self.on(triangle[row], weights)[0], self.vertices[tips]])
+        points, normals = self.on(triangle[row], weights)
+        tip = self._corners[1]
+        return np.vstack([points, self.vertices[self.triangles[tip]]]), np.vstack(
+            [normals, self.corner_normals[tip]]
+        )
 
     def creases_cut(self, longest_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Creases in straight pieces of at most `longest_m`: middles (k, 3) m, lengths (k,) m, by what angle

@@ -170,7 +170,7 @@ def _shape_key(model: Model) -> str:
         mesh.points,
         mesh.tetrahedra,
         mesh.fixed,
-        "" if mesh.shape is None else f"halved where uneven {mesh.shape.key}",
+        "" if mesh.shape is None else f"turns at corners {mesh.shape.key}",
         np.zeros(0) if sd is None else sd,
         np.hstack([model.presses.point, model.presses.normal]),
         float(model.tool.tip_radius_m),

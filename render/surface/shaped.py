@@ -19,7 +19,7 @@ from palpate.mechanics.frames import unit_vectors
 from palpate.mechanics.shape.nearest import facings, triangle_areas
 from palpate.mechanics.shape.tetmesh import TetMesh
 from palpate.mechanics.shape.true_shape import TrueShape
-from palpate.render.surface.triangles import cut, cut_beside, edges_of, pseudonormals
+from palpate.render.surface.triangles import cut, cut_beside, edges_of
 
 SAG_M = 8e-6
 """Between the middle of a fine edge and the shape: what is more is halved."""
@@ -159,10 +159,10 @@ def on_shape(
         made = made._replace(vertices=placed, normals=normals)
     if not sharp.any():
         return _halved_where_uneven(shape, mesh, made, free, sharp, largest)
-    line, before, rims = _line(shape, creases, placed[sharp], placed[rim]), len(placed), np.flatnonzero(sharp)
+    line, sides = _line(shape, creases, placed[sharp], placed[rim])
+    before = len(placed)
     placed, triangles, within, weights = cut_beside(placed, triangles, free, weights, sharp, line, strip_m)
     placed[before:], facing = shape.foot(placed[before:])
-    between = pseudonormals(placed, triangles)[rims]
     made = OnShape(placed, np.vstack([normals, facing]), triangles, within, weights)
     made = _halved_where_uneven(shape, mesh, made, free, sharp, largest)
     placed, normals, triangles, within, _ = made
@@ -170,7 +170,7 @@ def on_shape(
     own = own[~creases.hollow(placed[own])]
     away = line.query(placed[own], distance_upper_bound=strip_m)[0]
     own, away = own[away < strip_m], away[away < strip_m]
-    facing = between[cKDTree(placed[rims]).query(placed[own])[1]]
+    facing = _around(placed[own], line, sides, strip_m)
     normals[own] = _towards(normals[own], facing, 1 - away / strip_m)
     return made._replace(normals=normals)
 
@@ -249,13 +249,25 @@ def _creases(shape: TrueShape) -> _Creases:
     return _Creases(cKDTree(middles[turn < 0]), cKDTree(middles[turn > 0]))
 
 
-def _line(shape: TrueShape, creases: _Creases, rims: np.ndarray, base: np.ndarray) -> cKDTree:
-    """Points along those sharp creases that are nearer to vertices `rims` (r, 3) than to the base's."""
-    points = shape.crease_points(_CREASE_SPACING_M)
-    points = points[~creases.hollow(points)]
+def _line(
+    shape: TrueShape, creases: _Creases, rims: np.ndarray, base: np.ndarray
+) -> tuple[cKDTree, np.ndarray]:
+    """Points along those sharp creases that are nearer to vertices `rims` (r, 3) than to the base's, and the
+    normals (k, 3) of the faces that end there."""
+    points, sides = shape.crease_points(_CREASE_SPACING_M)
+    own = ~creases.hollow(points)
     if len(base):
-        points = points[cKDTree(rims).query(points)[0] < cKDTree(base).query(points)[0]]
-    return cKDTree(points)
+        own &= cKDTree(rims).query(points)[0] < cKDTree(base).query(points)[0]
+    return cKDTree(points[own]), sides[own]
+
+
+def _around(points: np.ndarray, line: cKDTree, sides: np.ndarray, reach_m: float) -> np.ndarray:
+    """(p, 3) unit: the mean normal of the faces that end at rims around `points` (p, 3), the nearer the more:
+    beside a corner no rim has all of it."""
+    pairs = cKDTree(points).sparse_distance_matrix(line, reach_m, output_type="ndarray")
+    pairs = pairs[np.lexsort((pairs["j"], pairs["i"]))]
+    weight = sp.csr_matrix((1 - pairs["v"] / reach_m, (pairs["i"], pairs["j"])), shape=(len(points), line.n))
+    return unit_vectors(weight @ sides, sides[line.query(points)[1]])
 
 
 def _on_creases(
@@ -272,7 +284,7 @@ def _on_creases(
     end.
     """
     creased = np.zeros(len(placed), dtype=bool)
-    samples = shape.crease_points(_CREASE_SPACING_M)
+    samples, _ = shape.crease_points(_CREASE_SPACING_M)
     if not len(samples):
         return creased
     tree = cKDTree(samples)

@@ -55,7 +55,7 @@ def _touched_surface(model: Model, edge_m: float, snap: bool) -> ContactSurface:
         mesh.tetrahedra,
         mesh.fixed,
         mesh.touchable,
-        "" if mesh.shape is None else f"ends on tips {mesh.shape.key}",
+        "" if mesh.shape is None else f"turns at corners {mesh.shape.key}",
         float(edge_m),
         *([] if mesh.shape is None else [rim_strip(model.tool.tip_radius_m)]),
         *([model.presses.point, model.presses.normal, float(model.tool.tip_radius_m)] if drawn else []),
