@@ -25,12 +25,14 @@ from palpate.diagnosis.verdict.result import Diagnosis
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.one_thread import one_thread
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Clock, Progress, part, silent
 from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.presses_on_model import presses_on
 
 
+@one_thread
 def diagnose(
     recording: Recording,
     model: Model,

@@ -17,6 +17,7 @@ from palpate.mechanics.disk.toml_text import plain
 from palpate.mechanics.errors import ContactError, FewPressesError, OptionError, PalpateWarning
 from palpate.mechanics.model.material import ObjectMaterial
 from palpate.mechanics.model.model import Model, Support, Tool
+from palpate.mechanics.one_thread import one_thread
 from palpate.mechanics.plausible import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Clock, Progress, part, silent, unsaid
@@ -147,6 +148,7 @@ def reconstruct(
     return reconstruct_fully(recording, options, progress).model
 
 
+@one_thread
 def reconstruct_fully(
     recording: Recording,
     options: ReconstructOptions | None = None,

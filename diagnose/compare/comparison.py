@@ -18,6 +18,7 @@ from palpate.diagnosis.compare.models import RIVALS, Fem, Prepared, predicted, p
 from palpate.mechanics.compliance.smooth_field import SmoothField
 from palpate.mechanics.errors import ContactError
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.one_thread import one_thread
 from palpate.mechanics.options import EXACT, option
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.progress import Progress, part, silent
@@ -133,6 +134,7 @@ class Comparison(Result):
         return int((table.argmin(axis=0) == names.index(name)).sum())
 
 
+@one_thread
 def compare(
     recording: Recording,
     model: Model | None = None,
@@ -154,6 +156,7 @@ def compare(
     return replace(found, recording=recording)
 
 
+@one_thread
 def compare_presses(
     table: Presses,
     model: Model,

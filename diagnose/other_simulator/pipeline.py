@@ -37,6 +37,7 @@ from palpate.diagnosis.verdict.result import Diagnosis, EffectEntry
 from palpate.diagnosis.verdict.where import locate
 from palpate.mechanics.errors import DiagnosisError
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.one_thread import one_thread
 from palpate.mechanics.progress import Progress, part, silent
 from palpate.mechanics.recording.recording import Recording
 from palpate.reconstruction.presses_on_model import presses_on
@@ -62,6 +63,7 @@ class Asked:
     base: Forces | None = None
 
 
+@one_thread
 def diagnose_simulated(
     recording: Recording,
     model: Model,

@@ -10,6 +10,7 @@ from typing import Any
 from palpate.diagnosis.other_simulator.runs import Runs, Sums, TruePath, Values
 from palpate.diagnosis.other_simulator.tuning import NEAR, Budget, SettingsSearch, Trial
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.one_thread import one_thread
 from palpate.mechanics.progress import Clocked, Progress, TimeIsUp, silent, until
 from palpate.mechanics.result import Result
 from palpate.render.simulators.base import Adapter
@@ -175,6 +176,7 @@ def _named(progress: Progress, stage: str) -> Progress:
     return lambda _, fraction: progress(stage, fraction)
 
 
+@one_thread
 def tuned(
     runs: Runs,
     model: Model,
