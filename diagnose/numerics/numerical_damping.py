@@ -9,19 +9,9 @@ from palpate.mechanics.effects.base import Parameter, Scope
 from palpate.mechanics.effects.settings import WEIGHED, ForwardSettings, TouchedScene
 
 
-def _velocity(scene: Forward) -> np.ndarray:
-    """(n, 3) m/s of the tip, device frame."""
-    t = scene.touches
-    out = np.zeros_like(t.position)
-    for part in t.parts:
-        if part.stop - part.start > 2:
-            out[part] = np.gradient(t.position[part], t.t[part], axis=0)
-    return out
-
-
 def _change(settings: ForwardSettings, values: np.ndarray, scene: TouchedScene) -> None:
     assert isinstance(scene, Forward), "numerical effects act on the presses of a diagnosis"
-    velocity = _velocity(scene)
+    velocity = scene.touches.velocity
     normal = scene.places.frame[scene.press, 0]
 
     def damped(force: np.ndarray) -> np.ndarray:

@@ -216,6 +216,15 @@ class Presses:
         return out
 
     @cached_property
+    def velocity(self) -> np.ndarray:
+        """(n, 3) m/s of the tip, device frame."""
+        out = np.zeros_like(self.position)
+        for part in self.parts:
+            if part.stop - part.start > 2:
+                out[part] = np.gradient(self.position[part], self.t[part], axis=0)
+        return out
+
+    @cached_property
     def push(self) -> np.ndarray:
         """(n,) N, force on the tool along the outward normal."""
         return np.einsum("ni,ni->n", self.force, self.normal[self.press])
