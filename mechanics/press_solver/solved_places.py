@@ -15,6 +15,7 @@ from palpate.mechanics.contact.touch import TouchedPlaces, touch_forces
 from palpate.mechanics.disk.scratch import cache_folder
 from palpate.mechanics.disk.store import content_key, load_or_build
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.one_thread import one_thread
 from palpate.mechanics.press_solver.press import LAWS, PressOptions, PressSolver
 from palpate.mechanics.progress import Progress, silent
 from palpate.mechanics.shape.refine import refinement_key
@@ -94,6 +95,7 @@ class SolvedPresses:
         """(DEPTHS,) m, at which a place is solved that was pressed so deep."""
         return min(deepest_m, MOST_RADII * self.tip_radius_m) * np.linspace(0.0, 1.0, DEPTHS + 1)[1:]
 
+    @one_thread
     def normal_force(
         self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, progress: Progress = silent
     ) -> np.ndarray:

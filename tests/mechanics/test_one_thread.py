@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import pytest
 from threadpoolctl import ThreadpoolController, threadpool_info
 
 from palpate.diagnosis.compare.comparison import compare
-from palpate.diagnosis.other_simulator import tuned
 from palpate.diagnosis.other_simulator.pipeline import diagnose_simulated
+from palpate.diagnosis.other_simulator.tuned import tuned
 from palpate.diagnosis.pipeline import diagnose
 from palpate.mechanics.one_thread import one_thread
+from palpate.mechanics.press_solver.solved_places import SolvedPresses
 from palpate.reconstruction.pipeline import reconstruct_fully
+
+FITS = (compare, diagnose, diagnose_simulated, reconstruct_fully, SolvedPresses.normal_force, tuned)
 
 
 def threads() -> list[int]:
@@ -34,7 +41,24 @@ def test_dense_algebra_has_one_thread_while_it_runs_and_its_own_again_after_an_e
         assert threads() == before
 
 
-@pytest.mark.parametrize("fits", [compare, diagnose, diagnose_simulated, reconstruct_fully, tuned.tuned])
+@pytest.mark.parametrize(("stated", "taken"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
+def test_a_command_has_one_unless_more_are_asked_for(stated: dict[str, str], taken: int) -> None:
+    code = (
+        "import sys; sys.argv = ['palpate', 'devices', '--json', '-']\n"
+        "from palpate.__main__ import main\n"
+        "main()\n"
+        "import scipy.linalg, threadpoolctl\n"
+        "dense = threadpoolctl.ThreadpoolController().select(internal_api='openblas')\n"
+        "print({each['num_threads'] for each in dense.info()})"
+    )
+    around = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    run = subprocess.run(
+        [sys.executable, "-c", code], env={**around, **stated}, capture_output=True, text=True, check=True
+    )
+    assert run.stdout.splitlines()[-1] == str({taken})
+
+
+@pytest.mark.parametrize("fits", FITS)
 def test_all_that_fits_thousands_of_times_is_on_one(fits, monkeypatch: pytest.MonkeyPatch) -> None:
     counted: list[object] = []
     monkeypatch.setattr(ThreadpoolController, "select", lambda *_, **given: counted.append(given))
