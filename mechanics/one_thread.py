@@ -2,8 +2,9 @@
 
 What is fitted thousands of times has matrices of some hundred rows. Spread over cores they take longer, most
 of all beside other work: threads wait for each other at a full turn each. And sums in another order round
-otherwise, so that a fit would depend on the machine's cores. The command line asks for one as it begins
-(`palpate.__main__`), which a user's own OPENBLAS_NUM_THREADS overrules; what others call asks for itself.
+otherwise, so that a fit would depend on the machine's cores. The command line has one as it begins
+(`palpate.__main__`), or as many as a user's own OPENBLAS_NUM_THREADS says; what fits has one wherever it is
+called.
 """
 
 from __future__ import annotations
