@@ -156,7 +156,6 @@ def compare(
     return replace(found, recording=recording)
 
 
-@one_thread
 def compare_presses(
     table: Presses,
     model: Model,

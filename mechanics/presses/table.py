@@ -209,19 +209,19 @@ class Presses:
     @cached_property
     def rate(self) -> np.ndarray:
         """(n,) m/s, of the depth; 0 of points without a time."""
-        out = np.zeros(len(self.t))
-        for part in () if self.quasi_static else self.parts:
-            if part.stop - part.start > 2:
-                out[part] = np.gradient(self.depth[part], self.t[part])
-        return out
+        return np.zeros(len(self.t)) if self.quasi_static else self._in_time(self.depth)
 
     @cached_property
     def velocity(self) -> np.ndarray:
         """(n, 3) m/s of the tip, device frame."""
-        out = np.zeros_like(self.position)
+        return self._in_time(self.position)
+
+    def _in_time(self, values: np.ndarray) -> np.ndarray:
+        """Their change a second, press by press; 0 of presses of two rows and fewer."""
+        out = np.zeros_like(values)
         for part in self.parts:
             if part.stop - part.start > 2:
-                out[part] = np.gradient(self.position[part], self.t[part], axis=0)
+                out[part] = np.gradient(values[part], self.t[part], axis=0)
         return out
 
     @cached_property

@@ -205,10 +205,9 @@ class TrueShape:
         weights[np.arange(len(row)), edge[row]] = 1 - share
         weights[np.arange(len(row)), (edge[row] + 1) % 3] += share
         points, normals = self.on(triangle[row], weights)
-        tip = self._corners[1]
-        return np.vstack([points, self.vertices[self.triangles[tip]]]), np.vstack(
-            [normals, self.corner_normals[tip]]
-        )
+        facing, tip = self._corners
+        points = np.vstack([points, self.vertices[self.triangles[tip]]])
+        return points, np.vstack([normals, facing[tip]])
 
     def creases_cut(self, longest_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Creases in straight pieces of at most `longest_m`: middles (k, 3) m, lengths (k,) m, by what angle

@@ -168,9 +168,9 @@ def on_shape(
     placed, normals, triangles, within, _ = made
     own = np.setdiff1d(triangles[free[within] > 0], rim)
     own = own[~creases.hollow(placed[own])]
-    away = line.query(placed[own], distance_upper_bound=strip_m)[0]
-    own, away = own[away < strip_m], away[away < strip_m]
-    facing = _around(placed[own], line, sides, strip_m)
+    away, nearest = line.query(placed[own], distance_upper_bound=strip_m)
+    own, away, nearest = (each[away < strip_m] for each in (own, away, nearest))
+    facing = unit_vectors(_around(placed[own], line, sides, strip_m), sides[nearest])
     normals[own] = _towards(normals[own], facing, 1 - away / strip_m)
     return made._replace(normals=normals)
 
@@ -262,12 +262,12 @@ def _line(
 
 
 def _around(points: np.ndarray, line: cKDTree, sides: np.ndarray, reach_m: float) -> np.ndarray:
-    """(p, 3) unit: the mean normal of the faces that end at rims around `points` (p, 3), the nearer the more:
+    """(p, 3) sums of the normals of the faces that end at rims around `points` (p, 3), the nearer the more:
     beside a corner no rim has all of it."""
     pairs = cKDTree(points).sparse_distance_matrix(line, reach_m, output_type="ndarray")
     pairs = pairs[np.lexsort((pairs["j"], pairs["i"]))]
     weight = sp.csr_matrix((1 - pairs["v"] / reach_m, (pairs["i"], pairs["j"])), shape=(len(points), line.n))
-    return unit_vectors(weight @ sides, sides[line.query(points)[1]])
+    return np.asarray(weight @ sides)
 
 
 def _on_creases(
