@@ -176,7 +176,8 @@ def said(figures: dict[str, float], *, from_touch: bool = False) -> str:
 
 def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOptions) -> tuple[float, float]:
     """(N, m): within which the force of a straight press of this depth stays, at 95 % of places, for that
-    some are not solved: at each of the first places against what the others alone tell of it.
+    some are not solved: at each of the first places against what the others alone tell of it; and for that
+    its elements are rough.
 
     Farther from its neighbours than any place between them, one that is left out says more than the error.
     """
@@ -199,7 +200,8 @@ def coarse_error(model: Model, compliance: CoarseCompliance, options: RenderOpti
         )[_STEPS - 1 :: _STEPS]
         for far in compliance.left_out()
     )
-    return float(np.quantile(np.linalg.norm(told - solved, axis=1), 0.95)), depth
+    missed = np.hypot(*(np.linalg.norm(each, axis=1) for each in (told - solved, compliance.rough * solved)))
+    return float(np.quantile(missed, 0.95)), depth
 
 
 def place_numbers(

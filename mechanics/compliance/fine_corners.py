@@ -7,7 +7,7 @@ solved with it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,12 @@ import scipy.sparse as sp
 
 from palpate.mechanics.compliance.compression import own_blocks
 from palpate.mechanics.compliance.near_field import ball_law
-from palpate.mechanics.compliance.patch import PatchSampler, half_space_compliance, triangle_shapes
+from palpate.mechanics.compliance.patch import (
+    PatchSampler,
+    half_space_compliance,
+    triangle_shapes,
+    usual_width,
+)
 from palpate.mechanics.compliance.sites import (
     load_width,
     patch_width,
@@ -34,6 +39,7 @@ from palpate.mechanics.shape.refine import coarse_feet, typical_edge
 from palpate.mechanics.shape.tetmesh import TetMesh, vertex_normals
 
 _SAME_FACE = np.cos(np.radians(40))
+_WIDER = 1.25
 _ENOUGH = 10  # corners for the six coefficients of a quadratic
 
 
@@ -78,6 +84,35 @@ class FineCorners:
     @cached_property
     def _sampler(self) -> PatchSampler:
         return PatchSampler(self.solver.mesh, self.width_m)
+
+
+@dataclass(frozen=True)
+class NarrowedCorners(FineCorners):
+    """Of elements too coarse for a patch of width_m: `wide` has the same corners under one that they bear,
+    and what that gives and one wider still are drawn out to it in a straight line."""
+
+    wide: FineCorners
+
+    def own(
+        self, corners: np.ndarray | slice = slice(None), progress: Progress = silent
+    ) -> tuple[np.ndarray, np.ndarray]:
+        normals, nu = self.normals[corners], self.solver.poisson_ratio
+        (own, bracing), (wider, _) = (each.own(corners, progress) for each in (self.wide, self._wider))
+        far = less_half_space(own, normals, nu, self.wide.width_m)
+        slope = far - less_half_space(wider, normals, nu, self._wider.width_m)
+        slope /= self.wide.width_m - self._wider.width_m
+        far += slope * (self.width_m - self.wide.width_m)
+        return far + half_space_compliance(normals, nu, self.width_m), bracing
+
+    @cached_property
+    def _wider(self) -> FineCorners:
+        return replace(self.wide, width_m=_WIDER * self.wide.width_m)
+
+
+def narrowed(wide: FineCorners) -> NarrowedCorners:
+    """The same corners under the usual patch."""
+    given = {each.name: getattr(wide, each.name) for each in fields(wide)}
+    return NarrowedCorners(**{**given, "width_m": usual_width(wide.solver.mesh)}, wide=wide)
 
 
 def fine_corners(

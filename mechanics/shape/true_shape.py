@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from palpate.mechanics.disk.store import content_key
-from palpate.mechanics.frames import unit_vectors
+from palpate.mechanics.frames import local_frames, unit_vectors
 from palpate.mechanics.shape.nearest import closest, neighbours, segments_cut, triangle_areas
 
 CREASE_DEGREES = 35.0
@@ -263,24 +263,19 @@ class TrueShape:
         step = max(20, int(_PAIRS / each))
         for start in range(0, len(points), step):
             rows = slice(start, start + step)
-            p, n = points[rows], normals[rows]
-            pairs = cKDTree(p).sparse_distance_matrix(tree, reach, output_type="ndarray")
-            # in one order, whichever places are asked for together
-            pairs = pairs[np.lexsort((pairs["j"], pairs["i"]))]
-            i, j = pairs["i"], pairs["j"]
-            weight = area[j] * np.exp(-((pairs["v"] / width_m) ** 2) / 2)
-            weight *= np.einsum("kx,kx->k", n[i], facing[j]) > _SAME_SIDE
-            mean = sp.csr_matrix((weight, (i, j)), shape=(len(p), len(places)))
-            total = np.maximum(np.asarray(mean.sum(axis=1)), 1e-300)
-            # each tensor turned into the place's own tangent plane, weighted
-            moved = _turned(bend[j], facing[j], n[i]) * weight[:, None, None]
-            sums = np.stack([np.bincount(i, moved[:, a, b], len(p)) for a in range(3) for b in range(3)], 1)
-            tensor = (sums / total).reshape(-1, 3, 3)
-            out = np.einsum("kx,ky->kxy", n, n)
-            # the normal's own direction is put far below, so that the two others come last
-            values, vectors = np.linalg.eigh((tensor + tensor.transpose(0, 2, 1)) / 2 - 1e9 * out)
-            result[rows] = values[:, [2, 1]]
-            direction[rows] = vectors[:, :, 2]
+            frame = local_frames(normals[rows])
+            near = cKDTree(points[rows]).sparse_distance_matrix(tree, reach, output_type="coo_matrix").tocsr()
+            i, j = np.repeat(np.arange(len(frame)), np.diff(near.indptr)), near.indices
+            seen = np.einsum("kx,kx->k", frame[i, 0], facing[j]) > _SAME_SIDE
+            weight = area[j] * np.exp(-((near.data / width_m) ** 2) / 2)
+            i, j, weight = i[seen], j[seen], weight[seen]
+            turned = _turned(bend[j], facing[j], frame[i])
+            total = np.maximum(np.bincount(i, weight, len(frame)), 1e-300)
+            xx, yy, xy = (np.bincount(i, weight * each, len(frame)) / total for each in turned)
+            mean, half = (xx + yy) / 2, (xx - yy) / 2
+            apart, angle = np.hypot(half, xy), np.arctan2(xy, half) / 2
+            result[rows] = np.stack([mean + apart, mean - apart], axis=1)
+            direction[rows] = np.cos(angle)[:, None] * frame[:, 1] + np.sin(angle)[:, None] * frame[:, 2]
         return result, direction
 
     def _facing(
@@ -402,15 +397,16 @@ def _bends(p: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return np.einsum("max,mab,mby->mxy", axes, flat, axes)
 
 
-def _turned(bend: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """(k, 3, 3) tensors of the planes with unit normals `before`, turned with them the shortest way."""
-    both = before + after
-    share = 1 / np.maximum(1 + np.einsum("kx,kx->k", before, after), 1e-9)
-    a = np.einsum("kxy,ky->kx", bend, after)
-    cross = np.einsum("kx,ky->kxy", both, a)
-    square = share**2 * np.einsum("kx,kx->k", after, a)
-    outer = np.einsum("kx,ky->kxy", both, both)
-    return bend - share[:, None, None] * (cross + cross.transpose(0, 2, 1)) + square[:, None, None] * outer
+def _turned(
+    bend: np.ndarray, before: np.ndarray, frames: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(k,) each, xx, yy and xy in frames (k, 3, 3) of normal, x and y, of tensors (k, 3, 3) of the planes
+    with unit normals `before` (k, 3), turned with them the shortest way onto the frames'."""
+    (nn, nx, ny), (_, xx, xy), (_, _, yy) = np.moveaxis(frames @ bend @ frames.transpose(0, 2, 1), 0, 2)
+    along, x, y = np.einsum("kax,kx->ak", frames, before)
+    share = 1 / (1 + along)
+    x, y = share * x, share * y
+    return xx - 2 * x * nx + nn * x * x, yy - 2 * y * ny + nn * y * y, xy - x * ny - y * nx + nn * x * y
 
 
 def _pieces(p: np.ndarray, longest_m: float) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance
@@ -22,6 +24,15 @@ from palpate.render.surface.snapping import touched_surface
 
 Compliance = SurfaceCompliance | OnDemandCompliance | CoarseCompliance
 _UP = np.array([0.0, 0.0, 1.0])
+
+
+class _Peaks(NamedTuple):
+    """Of rims, 1/m: narrower than a compliance's corners (c, 3) m lie apart, they are taken off those
+    (c, 3, 3) and given back where they are (v, 3, 3)."""
+
+    corners: np.ndarray
+    own: np.ndarray
+    there: np.ndarray
 
 
 class FineSurface:
@@ -54,11 +65,7 @@ class FineSurface:
         self._rims[touched] = missed.curvature
         self.softness[touched], back = given_back(model, points, normals, float(compliance.own_width_m[0]))
         self._added[touched] += back
-        # a rim's peak is narrower than corners lie apart: it is taken off theirs and given back where it is
-        width = max(float(compliance.own_width_m[0]), usual_width(mesh))
-        give = half_space_compliance(_UP, float(compliance.poisson_ratio[0]), width)[2, 2]
-        self._peaks = give * peaks(mesh, compliance.own_points, width)
-        self._added[touched] += give * peaks(mesh, points, width)
+        self._peaks = self._peaks_of(compliance)
         if mesh.shape is None:  # all are fitted at once: each is the same only among the same
             bent = _curvature(model, points, normals)
             self.curvature[touched] = bent + missed.curvature
@@ -93,10 +100,21 @@ class FineSurface:
     def _far_at(self, compliance: Compliance, vertices: np.ndarray) -> np.ndarray:
         """(k, 3, 3) 1/m at vertices (k,)."""
         points = self._vertices[vertices]
-        far = compliance.far_at(points, self._normals[vertices]) + self._added[vertices]
-        if self._peaks.any():
-            far -= quadratic_at(points, compliance.own_points, compliance.own_triangles, self._peaks)
+        if self._peaks.corners is not compliance.own_points:
+            self._peaks = self._peaks_of(compliance)
+        own, there = self._peaks.own, self._peaks.there
+        far = compliance.far_at(points, self._normals[vertices]) + (self._added[vertices] + there[vertices])
+        if own.any():
+            far -= quadratic_at(points, compliance.own_points, compliance.own_triangles, own)
         return far
+
+    def _peaks_of(self, compliance: Compliance) -> _Peaks:
+        mesh, corners = self._model.mesh, compliance.own_points
+        width = max(float(compliance.own_width_m[0]), usual_width(mesh))
+        give = half_space_compliance(_UP, float(compliance.poisson_ratio[0]), width)[2, 2]
+        there = np.zeros_like(self._added)
+        there[self._touched] = give * peaks(mesh, self._vertices[self._touched], width)
+        return _Peaks(corners, give * peaks(mesh, corners, width), there)
 
 
 def keep_surface(model: Model, options: RenderOptions) -> None:

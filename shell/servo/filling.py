@@ -1,5 +1,5 @@
-"""A table that is filled in beside the loop, in a process of its own: a coarse one first, then place after
-place, the nearest to the tip first, then what lies between the places.
+"""A table that is filled in beside the loop, in a process of its own: a coarse one first, by the mesh's own
+elements where they do, then place after place, the nearest to the tip first, then what lies between them.
 
 Run as `python -m palpate.servo.filling MODEL FOLDER` with pickled RenderOptions on its input, then a line
 `x y z` (m) wherever the tip has come; it tells of itself in JSON lines. It ends with its input, and what it
@@ -162,7 +162,13 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
     """Returns once the whole table is kept."""
     from palpate.mechanics.compliance.coarse_table import CoarseCompliance, first_places
     from palpate.mechanics.compliance.on_demand import OnDemandCompliance
-    from palpate.mechanics.compliance.stored_compliance import load_or_condense, load_or_solve
+    from palpate.mechanics.compliance.stored_compliance import (
+        load_coarse,
+        load_or_condense,
+        load_or_solve,
+        own_places,
+    )
+    from palpate.mechanics.law_errors import Bound
     from palpate.mechanics.model.files import read_model
     from palpate.render.fem.renderer import FemRenderer
     from palpate.render.force_error import coarse_error
@@ -172,26 +178,46 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
 
     said("factorising the object", 0.0)
     model = read_model(model_path)
-    solved = load_or_solve(model)
-    if not isinstance(solved, OnDemandCompliance):
-        return
-    first = first_places(solved.own_points)
-    if len(solved.own_points) <= _FEW * len(first):
-        load_or_condense(model, said)
-        return
-    for start in range(0, len(first), _AT_ONCE):
-        solved.solve(first[start : start + _AT_ONCE])
-        said("first places", min(start + _AT_ONCE, len(first)) / len(first))
+
+    def first_of(places: OnDemandCompliance) -> None:
+        first = first_places(places.own_points)
+        for start in range(0, len(first), _AT_ONCE):
+            places.solve(first[start : start + _AT_ONCE])
+            said("first places", min(start + _AT_ONCE, len(first)) / len(first))
 
     def at(compliance: CoarseCompliance) -> dict[str, Any]:
         error_n, depth_m = coarse_error(model, compliance, options)
         return {"solved": compliance.solved_share, "error_n": error_n, "depth_m": depth_m}
 
+    renderer: FemRenderer | None = None
+    own = None if load_coarse(model) else own_places(model)
+    if own is not None:
+        first_of(own)
+        tell({**at(CoarseCompliance(own, Bound.rough.value)), "solved": 0.0, FIRST: True})
+        _behind_the_loop()
+    solved = load_or_solve(model)
+    if not isinstance(solved, OnDemandCompliance):
+        return
+    if own is None and len(solved.own_points) <= _FEW * len(first_places(solved.own_points)):
+        load_or_condense(model, said)
+        return
+    first_of(solved)
+
+    def felt(compliance: CoarseCompliance) -> None:
+        """Let the loop feel it."""
+        nonlocal renderer
+        renderer = renderer or FemRenderer(model, options, compliance=compliance)
+        far, bracing = renderer.field_of(compliance)
+        change = FieldChange.written(folder / f"field-{len(compliance.known)}.npz", far, bracing=bracing)
+        tell({**at(compliance), FIELD: str(change.path)})
+
     coarse = CoarseCompliance(solved)
-    tell({**at(coarse), FIRST: True})
-    if hasattr(os, "nice"):
-        os.nice(_NICE)  # the loop comes first from now on
-    renderer, told = FemRenderer(model, options, compliance=coarse), len(coarse.known)
+    if own is None:
+        tell({**at(coarse), FIRST: True})
+        _behind_the_loop()
+    else:
+        felt(coarse)
+    told = len(coarse.known)
     while not solved.is_solved.all():
         missing = np.flatnonzero(~solved.is_solved)
         middle = solved.own_points.mean(axis=0) if tip.at is None else tip.at
@@ -199,13 +225,17 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
         solved.solve(np.sort(missing[np.argsort(near, kind="stable")[:_AT_ONCE]]))
         done = int(solved.is_solved.sum())
         if done >= _GROWTH * told or done == len(solved.own):
-            told, coarse = done, CoarseCompliance(solved)
-            far, bracing = renderer.field_of(coarse)
-            change = FieldChange.written(folder / f"field-{done}.npz", far, bracing=bracing)
-            tell({**at(coarse), FIELD: str(change.path)})
+            told = done
+            felt(CoarseCompliance(solved))
         else:
             tell({"solved": done / len(solved.own)})
     load_or_condense(model)
+
+
+def _behind_the_loop() -> None:
+    """The loop comes first from now on."""
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
 
 
 def main(argv: list[str]) -> int:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from palpate.mechanics.compliance import stored_compliance
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance, first_places
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.stored_compliance import (
@@ -15,8 +16,10 @@ from palpate.mechanics.compliance.stored_compliance import (
     load_or_solve,
 )
 from palpate.mechanics.errors import MeshError
+from palpate.mechanics.law_errors import Bound
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
+from palpate.mechanics.shape.refine import typical_edge
 from palpate.render.fem.held_tips import BLEND_S
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.force_error import coarse_error
@@ -66,6 +69,41 @@ def test_its_force_is_within_what_it_states(coarse, whole):
     # the narrower the patch of a place, the faster its own compliance falls off towards a rim
     assert np.quantile(missed, 0.9) < error < 0.25 * np.median(felt)
     assert error > 1e-5
+
+
+def test_a_table_by_elements_that_are_not_halved_serves_until_there_is_one_by_halved_ones(
+    model, whole, monkeypatch
+):
+    """What was begun with the one goes on with the other."""
+    monkeypatch.setattr(stored_compliance, "LARGE", 0)
+    monkeypatch.setattr(stored_compliance, "surface_edge", lambda mesh: 0.9 * typical_edge(mesh))
+    alone = read_model(write_model(model.path.parent / "alone", model))
+    assert stored_compliance.own_places(alone, kept=True) is None and load_coarse(alone) is None
+    own = stored_compliance.own_places(alone)
+    own.solve(first_places(own.own_points))
+    rough = create("fem", alone, OPTIONS, coarse=True)
+    assert rough.coarse and rough.compliance.rough == Bound.rough.value
+    stated = coarse_error(alone, rough.compliance, OPTIONS)[0]
+    assert stated > coarse_error(alone, CoarseCompliance(own), OPTIONS)[0]
+    far = rough.field_of(whole.compliance)[0]
+    assert np.array_equal(far, whole.parameters.far)
+    halved = load_or_solve(alone)
+    halved.solve(first_places(halved.own_points))
+    assert create("fem", alone, OPTIONS, coarse=True).compliance.rough == 0.0
+
+
+@pytest.mark.slow
+def test_elements_that_are_not_halved_tell_of_narrow_patches(tmp_path, monkeypatch):
+    """Two wide patches, drawn out to the usual one, give halved elements' far field to 5 % of a force."""
+    monkeypatch.setattr(stored_compliance, "LARGE", 0)
+    size = (0.05, 0.05, 0.025)
+    model = read_model(write_model(tmp_path / "block", shapes.model(shapes.block(size, (8, 8, 4)))))
+    own, halved = stored_compliance.own_places(model), load_or_solve(model)
+    at = np.array([[x, y, size[2]] for x in (0.0, 0.008, 0.016) for y in (0.0, 0.013)])
+    up = np.tile([0.0, 0.0, 1.0], (len(at), 1))
+    told, solved = (each.far_at(at, up)[:, 2, 2] for each in (own, halved))
+    dent = model.tool.tip_radius_m**-1 / (2 * np.sqrt(0.6)) * (1 - model.material.poisson_ratio**2)
+    assert np.abs(told - solved).max() < 0.05 * (1.5 * dent + solved.min())
 
 
 @pytest.mark.slow

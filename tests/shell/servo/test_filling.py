@@ -10,14 +10,20 @@ import numpy as np
 import pytest
 
 from palpate.mechanics.compliance.coarse_table import first_places
-from palpate.mechanics.compliance.stored_compliance import fills, kept_places, load_or_condense
+from palpate.mechanics.compliance.stored_compliance import (
+    fills,
+    kept_places,
+    load_or_condense,
+    own_places,
+)
 from palpate.mechanics.errors import PalpateError
-from palpate.mechanics.model.files import read_model
+from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
 from palpate.render.options import RenderOptions
 from palpate.render.registry import create
 from palpate.servo.filling import FillingTable
 from palpate.window.session import SessionOptions, TouchSession
+from tests.render import shapes
 from tests.shell.window.small import SIZE, block_model
 
 CORNER = np.array([0.03, -0.03, SIZE[2]])
@@ -84,6 +90,27 @@ def test_a_session_goes_on_from_a_coarse_table_to_the_whole_one(model: Model) ->
     whole = load_or_condense(read_model(model.path))
     anew = load_or_condense(model.replaced(path=None))
     assert np.array_equal(whole.own, anew.own) and np.array_equal(whole.blocks, anew.blocks)
+
+
+@pytest.mark.slow
+def test_a_large_object_is_felt_by_its_own_elements_until_halved_ones_are_solved(tmp_path: Path) -> None:
+    made = shapes.model(shapes.block((0.1, 0.1, 0.05), (12, 12, 6)))
+    model = read_model(write_model(tmp_path / "large", made))
+    table = FillingTable(model.path, RenderOptions())
+    try:
+        table.wait()
+        own = own_places(model, kept=True)
+        assert kept_places(model) is None and own.is_solved[first_places(own.own_points)].all()
+        assert table.solved == 0.0 and "coarse" in table.words
+        rough = create("fem", model, coarse=True)
+        changes = []
+        _until(lambda: changes.append(table.news()) or changes[-1] is not None)
+        assert table.solved > 0.0 and table.error_n > 0.0
+        finer = changes[-1].laid_on(rough).parameters.far
+        assert np.isfinite(finer).all() and not np.array_equal(finer, rough.parameters.far)
+    finally:
+        table.close()
+    assert create("fem", model, coarse=True).compliance.rough == 0.0
 
 
 def test_what_ends_it_is_said(tmp_path: Path) -> None:
