@@ -190,7 +190,8 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
         return {"solved": compliance.solved_share, "error_n": error_n, "depth_m": depth_m}
 
     renderer: FemRenderer | None = None
-    own = None if load_coarse(model) else own_places(model)
+    begun = load_coarse(model)
+    own = None if isinstance(begun, CoarseCompliance) and not begun.rough else own_places(model)
     if own is not None:
         first_of(own)
         tell({**at(CoarseCompliance(own, Bound.rough.value)), "solved": 0.0, FIRST: True})

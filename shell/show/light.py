@@ -45,10 +45,12 @@ def lit(points: np.ndarray, triangles: np.ndarray, side: np.ndarray | None = Non
     at[of] = triangles
     facets = normals = vertex_normals(points[at], of)
     i, j = of[:, [0, 1, 2, 1, 2, 0]].ravel(), of[:, [1, 2, 0, 0, 1, 2]].ravel()
+    around = sp.csr_matrix((np.full(len(i), 0.5), (i, j)), shape=(count, count))
+    i, shared = np.repeat(np.arange(count), np.diff(around.indptr)), around.data
     for _ in range(SWEEPS):
-        chord = np.linalg.norm(normals[i] - normals[j], axis=1)
-        weight = np.exp(-((chord / np.radians(ALIKE_DEG)) ** 2)) / 2
-        normals = normals + sp.csr_matrix((weight, (i, j)), shape=(count, count)) @ normals
+        chord = np.linalg.norm(normals[i] - normals[around.indices], axis=1)
+        around.data = shared * np.exp(-((chord / np.radians(ALIKE_DEG)) ** 2))
+        normals = normals + around @ normals
         normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     return LitSurface(at, of, normals, facets)
 

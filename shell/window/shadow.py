@@ -15,7 +15,7 @@ from palpate.show.colours import COLOURS
 
 FLOOR_COLOUR = np.array(pyvista.Color(COLOURS["support"]).int_rgb, dtype=float)
 DARKEST, UNDER = 0.5, 0.97
-_DIRECTIONS, _ANGLES, _NEAR_RINGS, _FAR_RINGS, _SMOOTH = 96, 72, 28, 12, 2.0
+_DIRECTIONS, _OUTERMOST, _ANGLES, _NEAR_RINGS, _FAR_RINGS, _SMOOTH = 96, 300, 72, 28, 12, 2.0
 
 
 def floor(middle: np.ndarray, up: np.ndarray, radius_m: float, points: np.ndarray) -> pyvista.PolyData:
@@ -42,26 +42,39 @@ def floor(middle: np.ndarray, up: np.ndarray, radius_m: float, points: np.ndarra
 def occlusion(places: np.ndarray, points: np.ndarray, up: np.ndarray) -> np.ndarray:
     """(k,) share of an even sky's light that an object (n, 3) takes from places (k, 3) of a plane below it.
 
-    The object is taken for its convex hull; directions are spread by the cosine law.
+    The object is taken for the hull of its points that lie outermost in some direction; those of the sky are
+    spread by the cosine law.
     """
     across, along = tangents(up)
-    hull = points[ConvexHull(points).vertices]
+    k = np.arange(_OUTERMOST) + 0.5
+    z, turn = 1 - 2 * k / _OUTERMOST, np.pi * (1 + np.sqrt(5)) * k
+    every = np.stack([z, np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn)])
+    hull = points[np.unique((every.T @ points.T).argmax(axis=1))]
     k = np.arange(_DIRECTIONS) + 0.5
     flat, turn = np.sqrt(k / _DIRECTIONS), np.pi * (1 + np.sqrt(5)) * k
     steep = np.sqrt(1 - flat**2)
     height = (hull - places[0]) @ up
     found = np.zeros(len(places))
-    seen = (places - places[0]) @ np.column_stack([across, along])
+    seen, flat_hull = ((each - places[0]) @ np.column_stack([across, along]) for each in (places, hull))
     for slope, angle in zip(flat / steep, turn, strict=True):
         # where the sun's ray through each corner meets the plane
-        cast = (hull - places[0]) @ np.column_stack([across, along])
-        cast = cast - height[:, None] * slope * np.array([np.cos(angle), np.sin(angle)])
+        cast = flat_hull - height[:, None] * slope * np.array([np.cos(angle), np.sin(angle)])
         try:
-            sides = ConvexHull(cast).equations
+            found += _within(seen, cast[ConvexHull(cast).vertices])
         except QhullError:
             continue
-        found += (seen @ sides[:, :2].T + sides[:, 2] <= 0).all(axis=1)
     return found / _DIRECTIONS
+
+
+def _within(places: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """(k,) bool, places (k, 2) inside of a convex polygon of corners (c, 2), counterclockwise."""
+    middle = corners.mean(axis=0)
+    angle, turned = (np.arctan2(*(each - middle).T[::-1]) for each in (places, corners))
+    first = int(turned.argmin())
+    corners, turned = np.roll(corners, -first, axis=0), np.roll(turned, -first)
+    end = np.searchsorted(turned, angle) % len(corners)
+    start, side = corners[end - 1], corners[end] - corners[end - 1]
+    return side[:, 0] * (places - start)[:, 1] >= side[:, 1] * (places - start)[:, 0]
 
 
 def blot(radius_m: float) -> pyvista.PolyData:

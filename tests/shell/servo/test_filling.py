@@ -96,6 +96,9 @@ def test_a_session_goes_on_from_a_coarse_table_to_the_whole_one(model: Model) ->
 def test_a_large_object_is_felt_by_its_own_elements_until_halved_ones_are_solved(tmp_path: Path) -> None:
     made = shapes.model(shapes.block((0.1, 0.1, 0.05), (12, 12, 6)))
     model = read_model(write_model(tmp_path / "large", made))
+    closed_at_once = FillingTable(model.path, RenderOptions())
+    closed_at_once.wait()
+    closed_at_once.close()
     table = FillingTable(model.path, RenderOptions())
     try:
         table.wait()
