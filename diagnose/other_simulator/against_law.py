@@ -20,12 +20,11 @@ from palpate.diagnosis.numerics.registry import numericals
 from palpate.diagnosis.options import AttributionOptions, NuisanceOptions
 from palpate.diagnosis.other_simulator.declared_parameters import StatedForward
 from palpate.diagnosis.search.attribution import Attribution, attribute
-from palpate.diagnosis.search.descent import Descent
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit, parameter_intervals, settings_of
 from palpate.diagnosis.search.limits import SEEN
 from palpate.diagnosis.search.rivals import Explanation, likeliest, names_of, without
-from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours, never_worse
+from palpate.diagnosis.verdict.held_out import neighbours, never_worse
 from palpate.mechanics.effects.base import Effect, Role
 from palpate.mechanics.effects.registry import effects
 from palpate.mechanics.law_errors import DepthLaw, FirstTouch, Level, Repeats, Smallest, Stiffness, Unnamed
@@ -192,17 +191,9 @@ def _squares(search: Search, found: Fit) -> np.ndarray:
     t = search.forward.touches
     out = np.zeros(search.whitener.groups)
     for fold in neighbours(t):
-        again = _without(search, found, fold)
+        again = search.without(found, fold)
         out[fold] = search.whitener.raw_gram(again.residual[:, :, None])[fold, 0, 0]
     return out
-
-
-def _without(search: Search, found: Fit, fold: np.ndarray) -> Fit:
-    weights = np.ones(search.whitener.groups)
-    weights[fold] = 0.0
-    return Descent(search.forward, search.whitener, found.effects, weights).run(
-        found.values, found.onset, ITERATIONS
-    )
 
 
 def _held_out(
@@ -215,7 +206,7 @@ def _held_out(
     law, together = np.zeros_like(t.local_force), np.zeros_like(t.local_force)
     added = {name: np.zeros_like(law) for name in names}
     for fold in neighbours(t):
-        again = _without(search, found, fold)
+        again = search.without(found, fold)
         rows = np.isin(t.site, fold)[t.press]
         whole = _predicted(forward, again, names)
         together[rows] = whole[rows]

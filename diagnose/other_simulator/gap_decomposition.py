@@ -29,12 +29,11 @@ from palpate.diagnosis.numerics.registry import numerical
 from palpate.diagnosis.options import AttributionOptions
 from palpate.diagnosis.other_simulator.against_law import COMMON_ERROR, Numerics
 from palpate.diagnosis.other_simulator.declared_parameters import Stated, StatedForward
-from palpate.diagnosis.search.descent import Descent
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit, settings_of
 from palpate.diagnosis.search.gaps import lower_closure
 from palpate.diagnosis.verdict.answer import Findings
-from palpate.diagnosis.verdict.held_out import ITERATIONS, neighbours
+from palpate.diagnosis.verdict.held_out import neighbours
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.friction_slip import EFFECT as SLIP
 from palpate.mechanics.effects.poisson_ratio import EFFECT as POISSON
@@ -82,9 +81,7 @@ def held_out(search: Search, found: Fit) -> HeldOutForces:
     for fold in neighbours(t):
         weights = np.ones(search.whitener.groups)
         weights[fold] = 0.0
-        again = Descent(search.forward, search.whitener, found.effects, weights).run(
-            found.values, found.onset, ITERATIONS
-        )
+        again = search.without(found, fold)
         by_modulus = again.jacobian[:, :, 0]
         raw = search.whitener.raw_gram(np.stack([again.residual, by_modulus], axis=2))
         others = weights @ raw.reshape(len(raw), 4)

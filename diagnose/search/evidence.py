@@ -19,9 +19,12 @@ from palpate.diagnosis.search.whiten import Whitener
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.settings import ForwardSettings
 
+REFIT_TURNS = 6
+
 
 class Search:
-    """Holds what all fits share: forward model, whitener, options, and a cache of fits by names.
+    """Holds what all fits share: forward model, whitener, options, and caches of fits by names and by what
+    was held out.
 
     starts: start vectors by effect that were sought in the data, in place of the effect's own.
     """
@@ -61,6 +64,7 @@ class Search:
         self.dof = 3.0 * float(self.whitener.counts().sum())
         self._near = found
         self._cache: dict[tuple[str, ...], JudgedSet] = {}
+        self._refitted: dict[tuple[int, bytes], tuple[Fit, Fit]] = {}
 
     def reweighed(self, found: Fit) -> Search:
         """The same search, weighing with the nuisances as they are at a fit."""
@@ -90,6 +94,18 @@ class Search:
         candidate = JudgedSet(found, held, plain, missed, self.dof, wide)
         self._cache[key] = candidate
         return candidate
+
+    def without(self, found: Fit, fold: np.ndarray) -> Fit:
+        """A fit again that has not seen the groups of `fold` (k,), numbers: a place's first touches are moved
+        all the same. What was asked before is not fitted again."""
+        key = id(found), fold.tobytes()
+        if key not in self._refitted:
+            weights = np.ones(self.whitener.groups)
+            weights[fold] = 0.0
+            descent = Descent(self.forward, self.whitener, found.effects, weights)
+            # beside the fit, whose number another one could have once it is gone
+            self._refitted[key] = found, descent.run(found.values, found.onset, REFIT_TURNS)
+        return self._refitted[key][1]
 
     def score(self, added: Sequence[Effect], new: JudgedSet, old: JudgedSet) -> Score:
         """Compare a candidate with the one that lacks `added`."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
@@ -39,6 +40,21 @@ class ThinnedWay:
         thin_u, thin_f = (np.array(v) for v in zip(*mean, strict=True))
         return cls(thin_u, thin_f)
 
+    def against_push(self, values: np.ndarray) -> np.ndarray:
+        """(n,) slope of values (n,) against the push: `np.gradient`, whose weights are worked out once."""
+        if len(values) < 3:
+            return np.ones(len(values))
+        before, here, after, first, last = self._weights
+        inner = before * values[:-2] + here * values[1:-1] + after * values[2:]
+        return np.hstack([(values[1] - values[0]) / first, inner, (values[-1] - values[-2]) / last])
+
+    @cached_property
+    def _weights(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, float]:
+        step = np.diff(self.push)
+        one, two = step[:-1], step[1:]
+        own = (two - one) / (one * two)
+        return -two / (one * (one + two)), own, one / (two * (one + two)), step[0], step[-1]
+
 
 def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> ThinnedWay:
     """The way in to the peak of one press: (n,) m, (n,) N; onset: travel at first touch, m."""
@@ -68,19 +84,16 @@ class _YieldingFit:
     ) -> tuple[float, float, list[np.ndarray]]:
         """(half the squares of what is kept, c, residual N of every row of each way) at one modulus."""
         c = 0.0
+        depths = [np.interp(way.push / np.exp(log_e), self.unit, self.depth) for way in ways]
+        gives = [np.abs(way.against_push(depth)) for way, depth in zip(ways, depths, strict=True)]
         for _ in range(2 if yields else 1):
-            rows, misses, weights = [], [], []
-            for way in ways:
-                depth = np.interp(way.push / np.exp(log_e), self.unit, self.depth)
-                gives = np.gradient(depth, way.push) if len(depth) > 2 else np.ones(len(depth))
-                weights.append(1 / np.maximum(np.abs(gives) + c, 1e-12))
-                misses.append(way.travel - depth)
-                rows.append(way.push)
+            weights = [1 / np.maximum(give + c, 1e-12) for give in gives]
             centred, pushed = [], []
-            for miss, push, w, keep in zip(misses, rows, weights, kept, strict=True):
+            for way, depth, w, keep in zip(ways, depths, weights, kept, strict=True):
                 share = (w * keep) ** 2 / max(float(((w * keep) ** 2).sum()), 1e-300)
+                miss = way.travel - depth
                 centred.append(miss - share @ miss)
-                pushed.append(push - share @ push)
+                pushed.append(way.push - share @ way.push)
             if yields:
                 a = np.concatenate([w * k * p for w, k, p in zip(weights, kept, pushed, strict=True)])
                 b = np.concatenate([w * k * m for w, k, m in zip(weights, kept, centred, strict=True)])

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from palpate.diagnosis.instrument.free_air_offsets import InstrumentOffsets
-from palpate.diagnosis.search.descent import Descent
 from palpate.diagnosis.search.evidence import Search
 from palpate.diagnosis.search.fit import Fit
 from palpate.diagnosis.search.gaps import gap, resampled
@@ -21,7 +20,6 @@ from palpate.diagnosis.verdict.answer import Answer, Findings
 from palpate.mechanics.presses.table import Presses
 
 FOLDS = 6
-ITERATIONS = 6
 SHARE = 0.2
 """Of the places, held out as the deepest and as the fastest."""
 
@@ -118,8 +116,7 @@ def _without(search: Search, found: Fit, fold: np.ndarray, extra: np.ndarray | N
     """(g,) plain sums of squares of a fit that has not seen the sites of `fold`."""
     weights = np.ones(search.whitener.groups)
     weights[fold] = 0.0
-    descent = Descent(search.forward, search.whitener, found.effects, weights)
-    again = descent.run(found.values, found.onset, ITERATIONS)
+    again = search.without(found, fold)
     residual = again.residual if extra is None else again.residual + extra
     modulus = again.jacobian[:, :, 0]
     raw = search.whitener.raw_gram(np.stack([residual, modulus], axis=2))

@@ -66,6 +66,13 @@ def _up_to(state, count):
 
 
 @kernel
+def _held_stretch(state):
+    """Integral of the stretch squared over the radius as it was remembered, m^3."""
+    top, u, v, square = _up_to(state, int(state[0]))
+    return max(top * (state[2] ** 2 + state[3] ** 2) - 2.0 * (state[2] * u + state[3] * v) + square, 0.0)
+
+
+@kernel
 def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
     """(force u, v, dent u, v, integral of the stretch squared over the radius) for contact radius a: free =
     d_t - C_tn F_n, stick = k_t / a."""
@@ -141,10 +148,11 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
     within = cvv * far[1, 0] ** 2 - 2.0 * cuv * far[1, 0] * far[2, 0] + cuu * far[2, 0] ** 2
     sound = cuu > 0.0 and minor > 0.0 and cnn * minor >= within
     fn = fu = fv = a = held = du = dv = stiffness = compliance = 0.0
-    last_dent = last_excess = push = 0.0
+    last_dent = last_excess = 0.0
+    stretch = _held_stretch(state)  # a first turn without it would shut the dent out of where it was
     for turn in range(80):
         dented, stiffness, a, grip, stiffens = dent_force(table, dent, radius, bend, plane_strain_modulus)
-        fn = dented + push
+        fn = dented + 0.5 * stick * stiffens * stretch
         # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
         # that
         compliance = max(cnn, -STIFFEST / stiffness)
@@ -159,8 +167,7 @@ def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick)
         # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
         free_u, free_v = d[1] + cun * fn, d[2] + cvn * fn
         fu, fv, du, dv, stretch = _tangential(state, a, stick * grip, cuu, cuv, cvv, free_u, free_v)
-        push = 0.5 * stick * stiffens * stretch
-        fn = dented + push
+        fn = dented + 0.5 * stick * stiffens * stretch
         excess = dent + compliance * fn - cun * fu - cvn * fv - press
         if excess > 0.0:
             high = dent

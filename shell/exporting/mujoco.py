@@ -98,7 +98,9 @@ def _softened(path: Path, subject: Subject) -> str:
         mujoco.mj_step(scene, data)
         felt.append(float(force_on_tip(mujoco, scene, data) @ subject.normal))
     way = np.linspace(subject.near, deep, _SETTLED)
-    own = replay(create("fem", subject.model), 1e-3 * np.arange(_SETTLED), way, progress=silent)
+    own = replay(
+        create("fem", subject.model, on_demand=True), 1e-3 * np.arange(_SETTLED), way, progress=silent
+    )
     return (
         f" ({mm(depth_m)} deep this one reads {mn(float(np.mean(felt[-_READ:])))} here, the model "
         f"{mn(float(own[-1] @ subject.normal))})"

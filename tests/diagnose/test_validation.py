@@ -215,6 +215,14 @@ def test_readings_put_back_count_as_gap(late):
     assert with_bias > 2 * held_out_by_refit(search, found, None, 0.0).plain.sum()
 
 
+def test_a_fit_that_has_not_seen_some_places_is_made_once_while_all_is_weighed_alike(late):
+    search, _, found = late
+    again = search.without(found, np.array([1, 2]))
+    assert search.without(found, np.array([1, 2])) is again
+    assert search.without(found, np.array([2])) is not again
+    assert search.reweighed(found).without(found, np.array([1, 2])) is not again
+
+
 def test_folds_hold_every_site_once_and_neighbours_together(late):
     t = late[0].forward.touches
     folds = neighbours(t)

@@ -132,6 +132,16 @@ def test_a_loop_that_stretches_shallow_and_lets_go_deep_costs_as_much_as_its_way
     assert works[0] == pytest.approx(works[1], abs=1e-5 * np.abs(pieces).sum())
 
 
+def test_a_tip_that_holds_still_feels_one_force():
+    """What its rings hold pushes it out: guessed at none, that shut out the dent at which the tip stood, and
+    each step halved its way back there."""
+    far = np.array([[30.0, 0.0, 5.0], [0.0, 30.0, 0.0], [5.0, 0.0, 50.0]])
+    still = [1e-3, 0, -3e-3]
+    d = np.vstack([path([0, 0, 0], still), np.tile(still, (50, 1))])
+    held = touch_force(d, UP, far, law="neo-hookean", **KNOWN)[-51:]
+    assert np.abs(held - held[0]).max() < 1e-11 * np.abs(held).max()
+
+
 def test_the_sampling_of_a_path_hardly_matters():
     far = np.diag([30.0, 30.0, 50.0])
     corners = ([0, 0, 0], [0.5e-3, 0, -4e-3], [1e-3, 0.5e-3, -2e-3])

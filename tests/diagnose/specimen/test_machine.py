@@ -10,6 +10,7 @@ import pytest
 
 from palpate.diagnosis.specimen.bench import MachineCycle
 from palpate.diagnosis.specimen.elastic_fit import NAMED, elastic_of
+from palpate.diagnosis.specimen.machine_compliance import ThinnedWay
 from palpate.diagnosis.specimen.material import material_of
 from palpate.diagnosis.specimen.result import MachineTests, Material
 from palpate.mechanics.contact.dent import dent_law
@@ -161,3 +162,13 @@ def test_parameters_are_written_as_people_write_them():
     assert in_words("tool_compliance", {"stiffness_n_per_m": 64e3}) == "stiffness 64 N/mm"
     words = in_words("viscoelasticity", {"g": [0.3, 0.2], "tau_s": [0.5, 20.0]})
     assert words == "of the lasting force 0.3 fades in 500 ms, 0.2 fades in 20 s"
+
+
+@pytest.mark.parametrize("rows", [2, 3, 40])
+def test_what_gives_against_the_push_is_its_slope_to_second_order(rows):
+    push = np.cumsum(np.random.default_rng(0).uniform(0.1, 1.0, rows))
+    way = ThinnedWay(push, push)
+    assert way.against_push(3 * push + 1) == pytest.approx(3.0 if rows > 2 else 1.0)
+    if rows > 2:
+        assert way.against_push(push**2)[1:-1] == pytest.approx(2 * push[1:-1])
+        assert way.against_push(np.sin(push)) == pytest.approx(np.gradient(np.sin(push), push))
