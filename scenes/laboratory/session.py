@@ -132,7 +132,8 @@ class Session:
     def run(
         self, present: Sequence[str], regions: bool = True, moved: np.ndarray | None = None
     ) -> tuple[SensedSamples, np.ndarray]:
-        """(readings, their force without noise), device frame, SI, with the effects `present`.
+        """(readings, their force without noise), device frame, SI, with the effects `present`; `felt` is then
+        the object's part (n, 3) N of it.
 
         moved: (n, 3) mm, object frame: the tip goes this much aside of the hand's way.
         """
@@ -152,10 +153,11 @@ class Session:
             if name == "viscoelasticity" and self.options.relaxation == "solid":
                 force = force + self._beyond_quasilinear(present, regions, way, normals)
         turn = self.rotation
+        self.felt = (force + way.trace_force) @ turn.T
         readings = SensedSamples(
             way.t,
             1e-3 * (way.position @ turn.T) + self.shift,
-            (force + way.trace_force) @ turn.T,
+            self.felt,
             turn @ axes_of(way.axis),
             way.t > way.phase[1] + 0.05,
         )

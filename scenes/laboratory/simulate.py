@@ -79,7 +79,7 @@ def truth_of(
         rest = [other for other in present if other != name and other not in gone]
         without = _answered(session, rest, whole, regions=name != "regions")
         label = "inclusion" if name == "regions" else name
-        truth["sizes"][label] = size_of(with_it[mask], without[mask])
+        truth["sizes"][label] = size_of(with_it[mask], without[mask], session.felt[mask])
     if names:
         truth["where"] = _where(session, present, clean, whole, way)
     session.run(present)
@@ -143,15 +143,16 @@ def contact_samples(way: Motion) -> np.ndarray:
     return count[high] - count[low] > 0
 
 
-def size_of(with_effect: np.ndarray, without: np.ndarray) -> dict[str, float]:
-    """Size of an effect from forces (k, 3) N: rms of the difference, also after the best factor
-    on `without`.
+def size_of(with_effect: np.ndarray, without: np.ndarray, felt: np.ndarray) -> dict[str, float]:
+    """Size of an effect from forces (k, 3) N: rms of the difference, also after the best factor on `felt`,
+    the object's part of `without`: another modulus scales no weight and no bias.
     """
-    scale = float((with_effect * without).sum() / max((without * without).sum(), 1e-300))
+    change = with_effect - without
+    more = float((change * felt).sum() / max((felt * felt).sum(), 1e-300))
     return {
-        "rms_n": _rms(with_effect - without),
-        "rms_after_best_scale_n": _rms(with_effect - scale * without),
-        "best_scale": scale,
+        "rms_n": _rms(change),
+        "rms_after_best_scale_n": _rms(change - more * felt),
+        "best_scale": 1 + more,
     }
 
 

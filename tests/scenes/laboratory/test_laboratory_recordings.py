@@ -131,10 +131,18 @@ def test_relaxation_decays_to_the_elastic_force() -> None:
 
 def test_size_of_an_effect_splits_off_what_the_modulus_absorbs() -> None:
     force = np.random.default_rng(0).normal(size=(500, 3))
-    size = size_of(1.2 * force, force)
+    size = size_of(1.2 * force, force, force)
     assert size["best_scale"] == pytest.approx(1.2)
     assert size["rms_after_best_scale_n"] < 1e-12
     assert size["rms_n"] == pytest.approx(0.2 * np.sqrt((force**2).sum(axis=1).mean()))
+
+
+def test_size_of_an_effect_is_the_same_beside_a_bias(springs) -> None:
+    # a modulus cannot scale what is read in free air: a skin of 10 mN was told as 70 beside a tool of 85 g
+    alone, biased = _run({"tip_radius": 1}), _run({"tip_radius": 1, "force_bias": 10})
+    one, two = (result.truth["sizes"]["tip_radius"] for result in (alone, biased))
+    assert two == pytest.approx(one, rel=1e-6)
+    assert one["rms_after_best_scale_n"] < 0.5 * one["rms_n"]
 
 
 def test_frame_turns_everything_together(springs) -> None:
