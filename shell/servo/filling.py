@@ -180,10 +180,8 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
     model = read_model(model_path)
 
     def first_of(places: OnDemandCompliance) -> None:
-        first = first_places(places.own_points)
-        for start in range(0, len(first), _AT_ONCE):
-            places.solve(first[start : start + _AT_ONCE])
-            said("first places", min(start + _AT_ONCE, len(first)) / len(first))
+        said("first places", 0.0)
+        places.solve(first_places(places.own_points))  # at once: each pass costs, however few they are
 
     def at(compliance: CoarseCompliance) -> dict[str, Any]:
         error_n, depth_m = coarse_error(model, compliance, options)
@@ -194,8 +192,9 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
     own = None if isinstance(begun, CoarseCompliance) and not begun.rough else own_places(model)
     if own is not None:
         first_of(own)
-        tell({**at(CoarseCompliance(own, Bound.rough.value)), "solved": 0.0, FIRST: True})
+        tell({"solved": 0.0, FIRST: True})  # a second before its error is known
         _behind_the_loop()
+        tell({**at(CoarseCompliance(own, Bound.rough.value)), "solved": 0.0})
     solved = load_or_solve(model)
     if not isinstance(solved, OnDemandCompliance):
         return
