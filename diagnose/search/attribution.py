@@ -230,7 +230,21 @@ class _Selection:
     def _take_one(
         self, best: Score, scores: dict[str, Score], odds: dict[Names, float], certain: bool
     ) -> None:
-        """The likeliest, by that law of its phenomenon which has the most evidence."""
+        """The likeliest, or a rival that says all that it says and more; by that law of its phenomenon which
+        has the most evidence."""
+        choice, instead = self._told_apart(best, scores, odds, certain)
+        if instead is not None and not certain:
+            best = instead
+            choice, _ = self._told_apart(best, scores, odds, certain)
+        best = scores[choice.taken[0]]
+        self.chosen.append(best.name)
+        self.choices.append(choice)
+        self._weigh_strain(best)
+
+    def _told_apart(
+        self, best: Score, scores: dict[str, Score], odds: dict[Names, float], certain: bool
+    ) -> tuple[Choice, Score | None]:
+        """The choice of the best, by its likeliest law, and of `_told_apart` what is to be taken instead."""
         for effect in self.effects:
             if of_one_phenomenon(effect, [best.effect]) and effect.name not in scores:
                 candidate = self.search.judge([*self.current.found.effects, effect], like=self.current)
@@ -239,9 +253,8 @@ class _Selection:
         best = _best_law(self.search, laws, best)
         others = {n: x for n, x in odds.items() if _another(scores[n[0]], best)}
         choice = Choice({**others, (best.name,): best.log_odds}, (best.name,), certain)
-        self._settle(best)
-        self.choices.append(_told_apart(self.search, choice, scores, best))
-        self._weigh_strain(best)
+        self.search.renew(best.candidate.found)
+        return _told_apart(self.search, choice, scores, best)
 
     def _take_two(self, scores: dict[str, Score], odds: dict[Names, float]) -> None:
         """Two that close the gap only together, where as many may still be named; else nothing more."""
@@ -272,8 +285,11 @@ def _another(score: Score, best: Score) -> bool:
     return not (wider or of_one_phenomenon(score.effect, best.added))
 
 
-def _told_apart(search: Search, choice: Choice, scores: dict[str, Score], best: Score) -> Choice:
-    """The choice, with the odds of the likeliest others as they follow from the best and both together.
+def _told_apart(
+    search: Search, choice: Choice, scores: dict[str, Score], best: Score
+) -> tuple[Choice, Score | None]:
+    """The choice, with the odds of the likeliest others as they follow from the best and both together; and
+    of those that are there beside the best, which is not beside them, the one that adds most.
 
     Two effects that leave the same to each other are as likely; one that leaves much to the best, to which it
     adds nothing, is not, whatever either gains by itself. search: weighs as things are at the best.
@@ -282,15 +298,18 @@ def _told_apart(search: Search, choice: Choice, scores: dict[str, Score], best: 
     others = [n for n, p in likely if n and n != choice.taken and p > UNLIKELY][:MOST_TOLD_APART]
     odds = dict(choice.log_odds)
     rest = [e for e in best.candidate.found.effects if e not in best.added]
+    most, more = 0.0, None
     for names in others:
         other = scores[names[0]]
         alone = search.judge(best.candidate.found.effects, like=best.candidate)
         instead = search.judge([*rest, *other.added], like=other.candidate)
         both = search.judge([*alone.found.effects, *other.added], like=alone)
-        adds = search.score(other.added, both, alone).log_odds
-        lacks = search.score(best.added, both, instead).log_odds
+        adds = search.score(other.added, both, alone).odds_of_shown
+        lacks = search.score(best.added, both, instead).odds_of_shown
         odds[names] = min(odds[names], best.log_odds + adds - lacks)
-    return dataclasses.replace(choice, log_odds=odds)
+        if adds > most and lacks < 0.0:
+            most, more = adds, other
+    return dataclasses.replace(choice, log_odds=odds), more
 
 
 def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:

@@ -99,14 +99,19 @@ class Score:
         return "+".join(e.name for e in self.added)
 
     @property
-    def evidence(self) -> float:
-        """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
-        is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which. No
-        more than our own law's errors leave to be told."""
+    def shown(self) -> float:
+        """The gain without the site that gains most, as one place that slipped, or whose surface is wrong,
+        speaks for whatever bends it. A lump lives in few places: all, less the price of which."""
         if self.effect.hints.few_places:
             return self.gain - float(np.log(len(self.per_group)))
-        told = self.gain - max(float(self.per_group.max()), 0.0)
-        return min(told, most_told(self.effect, self.candidate.found.of(self.effect.name), self.share))
+        return self.gain - max(float(self.per_group.max()), 0.0)
+
+    @property
+    def evidence(self) -> float:
+        """What is shown, but no more than our own law's errors leave to be told."""
+        if self.effect.hints.few_places:
+            return self.shown
+        return min(self.shown, most_told(self.effect, self.candidate.found.of(self.effect.name), self.share))
 
     @property
     def by_one_place(self) -> bool:
@@ -117,6 +122,12 @@ class Score:
     def log_odds(self) -> float:
         """That it is there, rather than an error of our own law."""
         return float(WEIGHTS.log_odds(self.evidence, self.border))
+
+    @property
+    def odds_of_shown(self) -> float:
+        """Log odds beside a rival for the same change: our own law's errors may be either's, and do not
+        choose."""
+        return float(WEIGHTS.log_odds(self.shown, self.border))
 
     @property
     def probability(self) -> float:

@@ -97,16 +97,21 @@ def test_probabilities_grow_with_evidence():
 
 
 @pytest.mark.parametrize(
-    ("adds", "lacks", "left"),
-    [(-10.0, -10.0, 9.0), (-10.0, 9.5, -9.5), (2.0, 4.0, 8.0)],
-    ids=["the same", "leaves much to the best, adds nothing", "each adds something"],
+    ("adds", "lacks", "left", "instead"),
+    [
+        (-10.0, -10.0, 9.0, False),
+        (-10.0, 9.5, -9.5, False),
+        (2.0, 4.0, 8.0, False),
+        (4.9, -10.7, 9.0, True),
+    ],
+    ids=["the same", "leaves much to the best, adds nothing", "each adds something", "says all, and more"],
 )
-def test_rivals_are_told_apart_by_what_each_adds_to_the_other(adds, lacks, left):
+def test_rivals_are_told_apart_by_what_each_adds_to_the_other(adds, lacks, left, instead):
     """Both gain much by themselves: odds of 10 and of 9 against nothing more."""
     nu, skin = effect("poisson_ratio"), effect("skin_layer")
     search = SimpleNamespace()
     search.judge = lambda effects, like: SimpleNamespace(found=SimpleNamespace(effects=effects))
-    search.score = lambda added, new, old: SimpleNamespace(log_odds=adds if skin in added else lacks)
+    search.score = lambda added, new, old: SimpleNamespace(odds_of_shown=adds if skin in added else lacks)
     scores = {
         e.name: SimpleNamespace(
             added=(e,), log_odds=odds, candidate=SimpleNamespace(found=SimpleNamespace(effects=(e,)))
@@ -114,8 +119,15 @@ def test_rivals_are_told_apart_by_what_each_adds_to_the_other(adds, lacks, left)
         for e, odds in ((nu, 10.0), (skin, 9.0))
     }
     choice = Choice({(n,): s.log_odds for n, s in scores.items()}, (nu.name,))
-    found = _told_apart(search, choice, scores, scores[nu.name])
+    found, more = _told_apart(search, choice, scores, scores[nu.name])
     assert found.log_odds[(skin.name,)] == pytest.approx(left)
+    assert more is (scores[skin.name] if instead else None)
+
+
+def test_our_own_law_hides_a_change_but_does_not_choose_between_two_causes_of_it():
+    """A skin beside a tip's radius changes the force by 0.5 %, and gains 86 nats that the radius has not."""
+    skin = score("skin_layer", [25.0, 20.0, 17.0, 14.0, 10.0], values=(0.004, 0.9), share=0.005)
+    assert skin.evidence < 4.0 and skin.log_odds < 0.0 < skin.odds_of_shown
 
 
 def test_a_lump_that_one_place_alone_speaks_for_is_known_as_such():
