@@ -232,16 +232,16 @@ class _Selection:
     ) -> None:
         """The likeliest, or a rival that says all that it says and more; by that law of its phenomenon which
         has the most evidence."""
-        choice, instead = self._told_apart(best, scores, odds, certain)
+        choice, instead = self._choice_of(best, scores, odds, certain)
         if instead is not None and not certain:
             best = instead
-            choice, _ = self._told_apart(best, scores, odds, certain)
+            choice, _ = self._choice_of(best, scores, odds, certain)
         best = scores[choice.taken[0]]
         self.chosen.append(best.name)
         self.choices.append(choice)
         self._weigh_strain(best)
 
-    def _told_apart(
+    def _choice_of(
         self, best: Score, scores: dict[str, Score], odds: dict[Names, float], certain: bool
     ) -> tuple[Choice, Score | None]:
         """The choice of the best, by its likeliest law, and of `_told_apart` what is to be taken instead."""
