@@ -19,7 +19,6 @@ from benchmarks._zoo_shapes import organ
 from palpate.mechanics.compliance.coarse_table import CoarseCompliance, first_places
 from palpate.mechanics.compliance.on_demand import OnDemandCompliance
 from palpate.mechanics.compliance.stored_compliance import load_or_condense, load_or_solve, own_places
-from palpate.mechanics.law_errors import Bound
 from palpate.mechanics.model.model import Model
 from palpate.render.fem.renderer import FemRenderer
 from palpate.render.force_error import coarse_error
@@ -48,7 +47,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         own = own_places(model)
         if own is not None:
             own.solve(first_places(own.own_points))
-            tables["first"] = CoarseCompliance(own, Bound.rough.value), time.process_time() - began
+            tables["first"] = CoarseCompliance(own), time.process_time() - began
         solved = load_or_solve(model)
         assert isinstance(solved, OnDemandCompliance), "nobody touched it before"
         solved.solve(first_places(solved.own_points))

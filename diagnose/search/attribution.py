@@ -234,8 +234,7 @@ class _Selection:
         has the most evidence."""
         choice, instead = self._choice_of(best, scores, odds, certain)
         if instead is not None and not certain:
-            best = instead
-            choice, _ = self._choice_of(best, scores, odds, certain)
+            choice, _ = self._choice_of(instead, scores, odds, certain)
         best = scores[choice.taken[0]]
         self.chosen.append(best.name)
         self.choices.append(choice)

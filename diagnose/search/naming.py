@@ -109,8 +109,6 @@ class Score:
     @property
     def evidence(self) -> float:
         """What is shown, but no more than our own law's errors leave to be told."""
-        if self.effect.hints.few_places:
-            return self.shown
         return min(self.shown, most_told(self.effect, self.candidate.found.of(self.effect.name), self.share))
 
     @property

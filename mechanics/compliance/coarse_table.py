@@ -27,14 +27,13 @@ _ROWS = 2000  # kriged at once
 class CoarseCompliance:
     """nodes, own_points, own_normals, own_triangles, own_width_m, poisson_ratio, blocks, factor: those of
     OnDemandCompliance. known: (n,) numbers of the corners that are solved. first: (p,) those of
-    `first_places`. rough: share of a force by which the elements that it was solved on miss finer ones, at
-    95 % of places.
+    `first_places`. rough: that of OnDemandCompliance.
 
     A snapshot of `solved`, whose first places must be known: raises MeshError where they are not.
     """
 
-    def __init__(self, solved: OnDemandCompliance, rough: float = 0.0) -> None:
-        self.rough = rough
+    def __init__(self, solved: OnDemandCompliance) -> None:
+        self.rough = solved.rough
         self.nodes, self.poisson_ratio = solved.nodes, solved.poisson_ratio
         self.own_points, self.own_normals = solved.own_points, solved.own_normals
         self.own_triangles, self.own_width_m = solved.own_triangles, solved.own_width_m

@@ -141,9 +141,9 @@ def load_coarse(model: Model) -> SurfaceCompliance | CoarseCompliance | None:
     condensed = _condensed(model)
     if condensed is not None:
         return condensed
-    for kept, rough in ((kept_places(model), 0.0), (own_places(model, kept=True), Bound.rough.value)):
+    for kept in (kept_places(model), own_places(model, kept=True)):
         if kept is not None and kept.is_solved[first_places(kept.own_points)].all():
-            return CoarseCompliance(kept, rough)
+            return CoarseCompliance(kept)
     return None
 
 
@@ -175,7 +175,7 @@ def own_places(model: Model, *, kept: bool = False) -> OnDemandCompliance | None
     def corners() -> FineCorners:
         return narrowed(fine_corners(model.mesh, nu, hold=hold, stretch_m=stretch, solver=solver()))
 
-    return OnDemandCompliance(model.mesh, nu, corners, solver, key, path)
+    return OnDemandCompliance(model.mesh, nu, corners, solver, key, path, Bound.rough.value)
 
 
 def _places_of(model: Model) -> tuple[str, Path | None]:

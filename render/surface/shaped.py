@@ -264,10 +264,9 @@ def _line(
 def _around(points: np.ndarray, line: cKDTree, sides: np.ndarray, reach_m: float) -> np.ndarray:
     """(p, 3) sums of the normals of the faces that end at rims around `points` (p, 3), the nearer the more:
     beside a corner no rim has all of it."""
-    pairs = cKDTree(points).sparse_distance_matrix(line, reach_m, output_type="ndarray")
-    pairs = pairs[np.lexsort((pairs["j"], pairs["i"]))]
-    weight = sp.csr_matrix((1 - pairs["v"] / reach_m, (pairs["i"], pairs["j"])), shape=(len(points), line.n))
-    return np.asarray(weight @ sides)
+    near = cKDTree(points).sparse_distance_matrix(line, reach_m, output_type="coo_matrix").tocsr()
+    near.data = 1 - near.data / reach_m
+    return np.asarray(near @ sides)
 
 
 def _on_creases(

@@ -168,7 +168,6 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
         load_or_solve,
         own_places,
     )
-    from palpate.mechanics.law_errors import Bound
     from palpate.mechanics.model.files import read_model
     from palpate.render.fem.renderer import FemRenderer
     from palpate.render.force_error import coarse_error
@@ -194,7 +193,7 @@ def _fill(model_path: Path, folder: Path, options: RenderOptions, tip: _Tip, tel
         first_of(own)
         tell({"solved": 0.0, FIRST: True})  # a second before its error is known
         _behind_the_loop()
-        tell({**at(CoarseCompliance(own, Bound.rough.value)), "solved": 0.0})
+        tell({**at(CoarseCompliance(own)), "solved": 0.0})
     solved = load_or_solve(model)
     if not isinstance(solved, OnDemandCompliance):
         return

@@ -46,12 +46,12 @@ def occlusion(places: np.ndarray, points: np.ndarray, up: np.ndarray) -> np.ndar
     spread by the cosine law.
     """
     across, along = tangents(up)
-    k = np.arange(_OUTERMOST) + 0.5
-    z, turn = 1 - 2 * k / _OUTERMOST, np.pi * (1 + np.sqrt(5)) * k
+    share, turn = _spread(_OUTERMOST)
+    z = 1 - 2 * share
     every = np.stack([z, np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn)])
     hull = points[np.unique((every.T @ points.T).argmax(axis=1))]
-    k = np.arange(_DIRECTIONS) + 0.5
-    flat, turn = np.sqrt(k / _DIRECTIONS), np.pi * (1 + np.sqrt(5)) * k
+    share, turn = _spread(_DIRECTIONS)
+    flat = np.sqrt(share)
     steep = np.sqrt(1 - flat**2)
     height = (hull - places[0]) @ up
     found = np.zeros(len(places))
@@ -64,6 +64,12 @@ def occlusion(places: np.ndarray, points: np.ndarray, up: np.ndarray) -> np.ndar
         except QhullError:
             continue
     return found / _DIRECTIONS
+
+
+def _spread(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """(count,) shares of an axis, turns about it by the golden angle, rad: even on a sphere or disc."""
+    k = np.arange(count) + 0.5
+    return k / count, np.pi * (1 + np.sqrt(5)) * k
 
 
 def _within(places: np.ndarray, corners: np.ndarray) -> np.ndarray:
