@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from palpate.diagnosis.verdict.result import Diagnosis
+from palpate.mechanics.effects.base import Role
+from palpate.mechanics.effects.registry import effect
 from palpate.show.diagnosis.gaps import in_model
 from palpate.show.diagnosis.parameters import short
 from palpate.words import spaced, spoken
@@ -25,7 +27,9 @@ def truth_lines(result: Diagnosis, truth: Mapping[str, Any]) -> list[str]:
     word, made_up = judged(result, truth)
     true = tuple(truth["effects"])
     said = [f"truth: {spoken(true) or 'nothing was left out'}, as sealed; the verdict is {word}"]
-    entries = sorted(result.entries, key=lambda e: (e.probability, e.gain), reverse=True)
+    # a law that holds for every body is no cause, unless it was sealed as one
+    causes = [e for e in result.entries if e.name in true or effect(e.name).role is not Role.KNOWN]
+    entries = sorted(causes, key=lambda e: (e.probability, e.gain), reverse=True)
     rank = {entry.name: k for k, entry in enumerate(entries, 1)}
     for name in true:
         if name not in rank:
