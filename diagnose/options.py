@@ -96,7 +96,24 @@ class AttributionOptions:
 class NuisanceOptions:
     """One standard deviation of what the baseline may get wrong, before it counts as a gap."""
 
-    onset_m: float = option(FirstTouch.diagnosis.value, "error of first touch, each press", unit="m")
+    onset_m: float = option(
+        FirstTouch.diagnosis.value, "error of first touch on a surface that is known, each press", unit="m"
+    )
+    fitted_onset_m: float = option(
+        FirstTouch.fitted.value, "the same on a surface that was fitted to the presses", unit="m"
+    )
+    fitted_onset_share: float = option(
+        FirstTouch.fitted_share.value, "beside it, share of what such a surface states of itself, each press"
+    )
+    common_onset_m: float = option(
+        FirstTouch.fitted_common.value,
+        "beside what such a surface states, error of first touch, all presses",
+        unit="m",
+    )
+    common_stick: float = option(Slip.level.value, "error of how a dent holds sideways, all presses, ln 1")
+    shallow_stick: float = option(
+        Slip.shallow.value, "error of how a shallow dent holds sideways, all presses, ln 1"
+    )
     site_stiffness: float = option(
         Stiffness.diagnosis.value,
         "share by which a site's stiffness may be wrong, where the law's bound is not known",

@@ -27,6 +27,14 @@ _CONTROLS = (
     "within 95 % of what 74 sound objects of the laboratory say: 0.7 to 1 of the bound, 0.4 to 1.2 of the "
     "surface's error (`palpate bench places`)"
 )
+_FITTED = (
+    "nine drawn in the laboratory: over what a surface states of itself (0.03 to 0.37 mm), it lies off the "
+    "true one by 1.1 (rms over recordings) on the whole and by 0.57 from place to place (docs/decisions/0080)"
+)
+_SOLVED_SIDEWAYS = (
+    "sound objects drawn by other solvers hold 0.77 of the law sideways at 0.2 tip radii of depth, 0.92 at "
+    "0.4, 0.97 beyond (docs/decisions/0080)"
+)
 _BOUND = "fitted to solved presses at places of known shapes (`palpate bench law-bound`)"
 
 
@@ -47,6 +55,13 @@ class FirstTouch:
     """Where a press first touches, along the normal."""
 
     diagnosis = OwnError(0.2e-3, "m", "first touch of a press", "press", _DIAGNOSIS)
+    fitted = OwnError(
+        0.05e-3, "m", "first touch on a surface that was fitted to the presses", "press", _FITTED
+    )
+    fitted_share = OwnError(
+        0.6, "1", "first touch on such a surface, of the surface's own stated error", "press", _FITTED
+    )
+    fitted_common = OwnError(0.1e-3, "m", "first touches on such a surface", "all places", _FITTED)
     simulator = OwnError(
         0.1e-3, "m", "first touch on the surface that a simulator was given too", "press", _SIMULATOR
     )
@@ -174,6 +189,16 @@ class Slip:
         "a tip dragged 3.7 mm over a dome and drawn out, in the laboratory: at 0.5 mm of depth the law holds "
         "1.35 N aside beside 0.3 N, where 0.36 N are solved",
     )  # fmt: skip
+    level = OwnError(
+        0.05, "1", "ln of how a dent holds sideways, in a diagnosis", "all places",
+        "at 0.15 a skin is taken up by it, at 0 a sound silicone gets one (docs/decisions/0080)",
+    )  # fmt: skip
+    shallow = OwnError(
+        0.3, "1", "the same of the shallowest dents, beside `level`", "all places", _SOLVED_SIDEWAYS
+    )
+    shallow_over = OwnError(
+        0.25, "1", "depth, in tip radii, over which `shallow` fades", "all places", _SOLVED_SIDEWAYS
+    )
     common = OwnError(
         0.15, "1", "force along the surface of all presses, of itself", "all places", _EXPLORING
     )

@@ -94,7 +94,7 @@ def _calibration(
     spread = covariance(found, search.dof)
     spread = spread + np.diag(_systematic(found) ** 2)
     drawn = rng.multivariate_normal(found.values, spread, _DRAWS, check_valid="ignore")
-    drawn = np.clip(drawn, *bounds_of(found.effects)[:2])
+    drawn = np.clip(drawn, *bounds_of(found.effects, search.whitener.shared_sd)[:2])
     rigid = _rigid_give(offsets)
     known = modulus_pa * np.exp(Level.calibration.value * rng.standard_normal(_DRAWS))
     give = rigid[0] + rigid[1] * rng.standard_normal(_DRAWS)
@@ -147,7 +147,7 @@ def _systematic(found: Fit) -> np.ndarray:
         none = np.zeros(len(effect.parameters))
         share = np.asarray(effect.hints.systematic_share or none) * found.of(effect.name)
         parts.append(np.hypot(effect.hints.systematic or none, share))
-    return np.concatenate(parts)
+    return np.concatenate([*parts, np.zeros_like(found.shared)])
 
 
 def _rigid_give(offsets: InstrumentOffsets) -> tuple[float, float]:

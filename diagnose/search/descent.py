@@ -101,6 +101,7 @@ def fit(
         starts = [np.array([np.log(modulus)])]
         for effect in effects:
             starts = [np.concatenate([s, own]) for s in starts for own in effect.starts()]
+        starts = [np.append(s, np.zeros_like(whitener.shared_sd)) for s in starts]
     descent = Descent(forward, whitener, effects, weights)
     onset = np.zeros(len(forward.touches)) if onset is None else onset
     if len(starts) > 3:
@@ -131,7 +132,7 @@ class Descent:
         self, forward: Forward, whitener: Whitener, effects: tuple[Effect, ...], weights: np.ndarray | None
     ) -> None:
         self.forward, self.whitener, self.effects, self.weights = forward, whitener, effects, weights
-        self.low, self.high, self.step, self.prior, self.centre = bounds_of(effects)
+        self.low, self.high, self.step, self.prior, self.centre = bounds_of(effects, whitener.shared_sd)
 
     def residual(self, values: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(n, 3) N, measured less predicted."""
@@ -161,6 +162,9 @@ class Descent:
         columns = np.empty((*residual.shape, len(values)))
         columns[:, :, 0] = 0.0
         for i in range(0 if self.forward.measured else 1, len(values)):
+            if self.low[i] == self.high[i]:
+                columns[:, :, i] = 0.0
+                continue
             moved = values.copy()
             h = self.step[i] if values[i] + self.step[i] <= self.high[i] else -self.step[i]
             moved[i] += h

@@ -83,6 +83,7 @@ class Search:
             known = effect.name in near.names
             own = [near.of(effect.name)] if known else self.starts.get(effect.name) or effect.starts()
             starts = [np.concatenate([s, o]) for s in starts for o in own]
+        starts = [np.append(s, near.shared) for s in starts]
         descent = Descent(self.forward, self.whitener, tuple(effects), None)
         scored = [descent.loss(s, descent.residual(s, near.onset), near.onset) for s in starts]
         runs = (descent.run(starts[i], near.onset, 12) for i in np.argsort(scored)[:3])

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from palpate.diagnosis.forward.prediction import Forward
+from palpate.diagnosis.search.shared import SHARED
 from palpate.mechanics.effects.base import Effect
 from palpate.mechanics.effects.settings import ForwardSettings
 
@@ -22,9 +23,9 @@ MODULUS_STEP = 0.01
 class Fit:
     """The optimum of one set of effects.
 
-    values: log modulus, then each effect's parameters in order. loss: half the whitened sum of squares, prior
-    included. residual: (n, 3) N, measured less predicted. jacobian: (n, 3, k) of the prediction by the
-    values.
+    values: log modulus, each effect's parameters in order, then errors that all presses share. loss: half the
+    whitened sum of squares, prior included. residual: (n, 3) N, measured less predicted. jacobian: (n, 3, k)
+    of the prediction by the values.
     gram, raw: (g, 1 + k, 1 + k) inner products of [residual, jacobian], whitened and plain. onset: (p,) m,
     first touches as the descent moved them. likeliest: (p,) m, the same where each press's
     plain misfit is least, for residual and raw.
@@ -52,6 +53,11 @@ class Fit:
         """Names of the effects."""
         return tuple(e.name for e in self.effects)
 
+    @property
+    def shared(self) -> np.ndarray:
+        """(s,) the errors that all presses share (search.shared)."""
+        return self.values[1 + sum(len(e.parameters) for e in self.effects) :]
+
     def of(self, name: str) -> np.ndarray:
         """One effect's values."""
         return self.values[self.place_of(name)]
@@ -70,7 +76,8 @@ class Fit:
 def settings_of(
     forward: Forward, effects: Sequence[Effect], values: np.ndarray, onset: np.ndarray | None = None
 ) -> ForwardSettings:
-    """The forward model's settings for a vector of log modulus and effect parameters, first touches moved."""
+    """The forward model's settings for a vector of log modulus, effect parameters and shared errors (or none
+    of these), first touches moved."""
     settings = forward.ideal(float(np.exp(values[0])))
     if onset is not None:
         settings.onset = settings.onset + onset
@@ -79,13 +86,16 @@ def settings_of(
         k = len(effect.parameters)
         effect.act(settings, values[i : i + k], forward)
         i += k
+    for shared, value in zip(SHARED, values[i:], strict=False):
+        shared.act(settings, float(value))
     return settings
 
 
 def bounds_of(
-    effects: tuple[Effect, ...],
+    effects: tuple[Effect, ...], shared_sd: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(k,) each of all values: least, greatest, step, weight of the prior, and its centre."""
+    """(k,) each of all values: least, greatest, step, weight of the prior, and its centre. shared_sd: (s,) of
+    errors that all presses share; what is known stays 0."""
     low, high, step, prior, centre = [-np.inf], [np.inf], [MODULUS_STEP], [0.0], [0.0]
     for effect in effects:
         for p in effect.parameters:
@@ -94,6 +104,12 @@ def bounds_of(
             step.append(p.step)
             prior.append(0.0 if p.prior_std is None else 1 / p.prior_std**2)
             centre.append(p.ideal)
+    for shared, sd in zip(SHARED, shared_sd, strict=False):
+        low.append(-shared.most if sd > 0 else 0.0)
+        high.append(shared.most if sd > 0 else 0.0)
+        step.append(shared.step)
+        prior.append(1 / sd**2 if sd > 0 else 1.0)
+        centre.append(0.0)
     return np.array(low), np.array(high), np.array(step), np.array(prior), np.array(centre)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import expit
 
 from palpate.diagnosis.search.evidence import Search
-from palpate.diagnosis.search.fit import settings_of
+from palpate.diagnosis.search.fit import Fit, settings_of
 from palpate.diagnosis.search.gaps import beside_modulus_n, modulus_share
 from palpate.diagnosis.search.leave_one_out import JudgedSet
 from palpate.diagnosis.search.naming import WEIGHTS, most_told
@@ -97,7 +97,7 @@ class Patterns:
         told = [most_told(effects[k], form, s) for k, form, s in zip(own, forms, shares, strict=True)]
         self.beyond, self.columns = np.array(told), shown
         drawn = whitener.drawn(DRAWS, np.random.default_rng(seed))
-        both = np.concatenate([shown, drawn], axis=2)
+        both = without_shared(search, found, np.concatenate([shown, drawn], axis=2))
         self.white = Products.of(whitener.gram(both), shown.shape[2])
         self.groups = whitener.groups
 
@@ -249,6 +249,18 @@ def _summed(x: np.ndarray, others: bool) -> np.ndarray:
     """(d, g) of x (d, g): each group's sum over all groups, or over the others."""
     total = x.sum(axis=1, keepdims=True)
     return total - x if others else np.broadcast_to(total, x.shape)
+
+
+def without_shared(search: Search, found: Fit, changes: np.ndarray) -> np.ndarray:
+    """(n, 3, c) N, changes less what the errors that all presses share take up, as likely as they are."""
+    sd = search.whitener.shared_sd
+    if not sd.any():
+        return changes
+    columns = found.jacobian[:, :, len(found.values) - len(sd) :] * sd
+    k = len(sd)
+    gram = search.whitener.gram(np.concatenate([columns, changes], axis=2)).sum(axis=0)
+    left: np.ndarray = changes - columns @ np.linalg.solve(gram[:k, :k] + np.eye(k), gram[:k, k:])
+    return left
 
 
 def without_first_touches(search: Search, changes: np.ndarray, *, plainly: bool = False) -> np.ndarray:

@@ -21,6 +21,7 @@ from scipy.linalg import cholesky, solve_triangular
 from palpate.diagnosis.forward.prediction import Forward
 from palpate.diagnosis.forward.touches import FOLLOWED
 from palpate.diagnosis.options import NuisanceOptions
+from palpate.diagnosis.search.shared import own_onset_sd, shared_sd
 from palpate.mechanics.effects.settings import ForwardSettings
 from palpate.mechanics.presses.table import Presses
 
@@ -72,7 +73,7 @@ class Whitener:
         slow: float = 1.0,
     ) -> None:
         """site_sd: (p,) share by which each press's stiffness may be off; by default the options'. onset_sd:
-        (p,) m, of each first touch; by default the options' and what the table states of each. slow: by how
+        (p,) m, of each first touch; by default search.shared.own_onset_sd. slow: by how
         much more than white the noise counts (its variance), as slow noise adds up along a press."""
         self.touches = forward.touches
         self.variance = slow * self.touches.noise_n**2 + options.floor_n**2
@@ -85,8 +86,8 @@ class Whitener:
         self.sample_variance = self.touches.noise_n**2 + options.floor_n**2 + unnamed + unbridged
         self.blocks: list[WhitenedGroup] = []
         presses = len(self.touches)
-        stated = np.hypot(options.onset_m, self.touches.onset_error_m)
-        self.onset_sd = stated if onset_sd is None else onset_sd
+        self.shared_sd = shared_sd(forward, options)
+        self.onset_sd = own_onset_sd(forward, options) if onset_sd is None else onset_sd
         columns = nuisance_columns(forward, settings, before, options, site_sd, self.onset_sd)
         columns += [("press", bridge) for bridge in bridges]
         self.onset_column = columns[0][1] / self.onset_sd[self.touches.press][:, None]

@@ -146,4 +146,4 @@ def test_what_only_the_support_tells_is_asked_of_it(bench, name, kind):
     pair = [(n, search.judge([search.finite_strain, effect(n)])) for n in (name, "tip_radius")]
     touch = next_touch(forward, *pair, NuisanceOptions())
     assert (touch.kind, touch.separates) == (kind, (name, "tip_radius"))
-    assert touch.sigmas > 3
+    assert touch.sigmas > 2  # presses may take part of a move for their own first touch

@@ -41,6 +41,11 @@ def test_options_default_to_the_table():
     defaults = {
         NuisanceOptions: {
             "onset_m": FirstTouch.diagnosis,
+            "fitted_onset_m": FirstTouch.fitted,
+            "fitted_onset_share": FirstTouch.fitted_share,
+            "common_onset_m": FirstTouch.fitted_common,
+            "common_stick": Slip.level,
+            "shallow_stick": Slip.shallow,
             "site_stiffness": Stiffness.diagnosis,
             "law_bound": Stiffness.bound,
             "surface": Stiffness.surface,
