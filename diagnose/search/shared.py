@@ -34,19 +34,24 @@ def _touch_early(settings: ForwardSettings, value: float) -> None:
     settings.onset = settings.onset + value
 
 
-def _stick_less(settings: ForwardSettings, value: float) -> None:
-    factor = np.exp(-value * np.exp(-grid() / Slip.shallow_over.value))
-    settings.touch.factors.append(lambda poisson_ratio: (1.0, factor, 0.0))
-
-
 def _hold_less(settings: ForwardSettings, value: float) -> None:
-    settings.touch.factors.append(lambda poisson_ratio: (1.0, np.exp(-value), 0.0))
+    _sideways(settings, np.full_like(grid(), -value))
+
+
+def _shallow_hold_less(settings: ForwardSettings, value: float) -> None:
+    _sideways(settings, -value * np.exp(-grid() / Slip.shallow_over.value))
+
+
+def _sideways(settings: ForwardSettings, log: np.ndarray) -> None:
+    """log: (k,) ln of the factor at `grid()`."""
+    same = np.ones_like(log)
+    settings.touch.factors.append(lambda poisson_ratio: (same, np.exp(log), 0.0 * log))
 
 
 SHARED = (
     SharedError(2e-5, 2e-3, _touch_early),
     SharedError(0.02, 1.0, _hold_less),
-    SharedError(0.02, 1.5, _stick_less),
+    SharedError(0.02, 1.5, _shallow_hold_less),
 )
 """How much earlier all presses met the surface than it says, m; how much less a dent holds sideways, and a
 shallow one less than that, ln 1."""
