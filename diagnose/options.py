@@ -110,10 +110,8 @@ class NuisanceOptions:
         "beside what such a surface states, error of first touch, all presses",
         unit="m",
     )
-    common_stick: float = option(Slip.level.value, "error of how a dent holds sideways, all presses, ln 1")
-    shallow_stick: float = option(
-        Slip.shallow.value, "error of how a shallow dent holds sideways, all presses, ln 1"
-    )
+    common_stick: float = option(Slip.level.value, "share by which dents may hold less sideways, all presses")
+    shallow_stick: float = option(Slip.shallow.value, "the same of the shallowest dents, beside it")
     site_stiffness: float = option(
         Stiffness.diagnosis.value,
         "share by which a site's stiffness may be wrong, where the law's bound is not known",

@@ -53,8 +53,8 @@ SHARED = (
     SharedError(0.02, 1.0, _hold_less),
     SharedError(0.02, 1.5, _shallow_hold_less),
 )
-"""How much earlier all presses met the surface than it says, m; how much less a dent holds sideways, and a
-shallow one less than that, ln 1."""
+"""By how much all presses met the surface earlier than it says, m; by how much less all dents hold sideways,
+ln of the factor; and by how much less than that shallow ones."""
 
 
 def shared_sd(forward: Forward, options: NuisanceOptions) -> np.ndarray:
