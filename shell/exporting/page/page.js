@@ -46,7 +46,8 @@ class PressPage extends SeenTip {
   }
 
   under(event) {
-    const place = this.surface.ray(this.camera.eye, this.rayOf(event));
+    const way = this.rayOf(event); // places the eye, as no frame may have been drawn yet
+    const place = this.surface.ray(this.camera.eye, way);
     return place && this.surface.free[place.triangle] ? place : null;
   }
 

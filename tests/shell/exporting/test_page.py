@@ -349,6 +349,13 @@ def test_a_drag_beside_the_object_turns_it_and_the_wheel_zooms(tab):
 
 
 @needs_browser
+def test_a_pointer_that_comes_before_the_first_frame_finds_the_object(asked):
+    x, y = on_the_object(asked)
+    early = f"palpate.page.under({{clientX: {x}, clientY: {y}}}) !== null"
+    assert asked.evaluate(f"(() => {{ delete palpate.page.camera.eye; return {early}; }})()")
+
+
+@needs_browser
 def test_a_pen_presses_as_hard_as_it_is_pressed(tab):
     x, y = on_the_object(tab)
     pen = {"pointerType": "pen", "button": "left", "buttons": 1}
