@@ -148,3 +148,10 @@ class NuisanceOptions:
     floor_n: float = option(
         Unnamed.force.value, "error of the model that no name covers, each thinned component", unit="N"
     )
+
+    def each_by_itself(self) -> NuisanceOptions:
+        """The same without errors that presses share, and with first touches as wide whatever the surface."""
+        return replace(
+            self, fitted_onset_m=self.onset_m, fitted_onset_share=0.0,
+            common_onset_m=0.0, common_stick=0.0, shallow_stick=0.0,
+        )  # fmt: skip

@@ -29,11 +29,12 @@ _CONTROLS = (
 )
 _FITTED = (
     "nine drawn in the laboratory: over what a surface states of itself (0.03 to 0.37 mm), it lies off the "
-    "true one by 1.1 (rms over recordings) on the whole and by 0.57 from place to place (docs/decisions/0080)"
+    "true one by 1.1 (rms over recordings) on the whole and by 0.57 from place to place"
 )
+_FLOOR = f"{_SET}: what a surface of few numbers may miss of a real one, beside what it states"
 _SOLVED_SIDEWAYS = (
     "sound objects drawn by other solvers hold 0.77 of the law sideways at 0.2 tip radii of depth, 0.92 at "
-    "0.4, 0.97 beyond (docs/decisions/0080)"
+    "0.4, 0.97 beyond"
 )
 _BOUND = "fitted to solved presses at places of known shapes (`palpate bench law-bound`)"
 
@@ -56,12 +57,12 @@ class FirstTouch:
 
     diagnosis = OwnError(0.2e-3, "m", "first touch of a press", "press", _DIAGNOSIS)
     fitted = OwnError(
-        0.05e-3, "m", "first touch on a surface that was fitted to the presses", "press", _FITTED
+        0.05e-3, "m", "first touch on a surface that was fitted to the presses", "press", _FLOOR
     )
     fitted_share = OwnError(
         0.6, "1", "first touch on such a surface, of the surface's own stated error", "press", _FITTED
     )
-    fitted_common = OwnError(0.1e-3, "m", "first touches on such a surface", "all places", _FITTED)
+    fitted_common = OwnError(0.1e-3, "m", "first touches on such a surface", "all places", _FLOOR)
     simulator = OwnError(
         0.1e-3, "m", "first touch on the surface that a simulator was given too", "press", _SIMULATOR
     )

@@ -129,11 +129,7 @@ def softer(compliance: np.ndarray) -> Act:
 LEAST_PRESSES = 6
 SUPPORT_GIVES = 1.5e-5
 """m/N, standard deviation of what a support or its tracing seems to yield by itself."""
-NUISANCE = NuisanceOptions(
-    floor_share=Unnamed.share_exploring.value, latency_s=0.0,
-    fitted_onset_m=FirstTouch.diagnosis.value, fitted_onset_share=0.0, common_onset_m=0.0, common_stick=0.0,
-    shallow_stick=0.0,
-)  # fmt: skip
+NUISANCE = NuisanceOptions(floor_share=Unnamed.share_exploring.value, latency_s=0.0).each_by_itself()
 """As a diagnosis has them, but that 'none' holds what is small against the force already, that a running
 surface is not yet fitted so well, and that `common_errors` are what presses share."""
 LITTLE = 0.1

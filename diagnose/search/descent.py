@@ -159,11 +159,9 @@ class Descent:
     def jacobian(self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(n, 3, k) of the prediction, by forward differences."""
         base = self.forward.touches.local_force - residual
-        columns = np.empty((*residual.shape, len(values)))
-        columns[:, :, 0] = 0.0
+        columns = np.zeros((*residual.shape, len(values)))
         for i in range(0 if self.forward.measured else 1, len(values)):
             if self.low[i] == self.high[i]:
-                columns[:, :, i] = 0.0
                 continue
             moved = values.copy()
             h = self.step[i] if values[i] + self.step[i] <= self.high[i] else -self.step[i]

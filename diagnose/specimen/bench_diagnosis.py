@@ -137,19 +137,17 @@ def _nuisance(bench: Bench) -> NuisanceOptions:
     floor is a share of the greatest. Each curve has a first touch of its own; nothing is held sideways."""
     of_peak = Unnamed.peak_pieces if bench.specimens else Unnamed.peak_one_piece
     plain = NuisanceOptions(
-        floor_n=of_peak.value * PEAK_N, floor_share=Unnamed.share_curves.value, latency_s=0.0,
-        fitted_onset_m=FirstTouch.diagnosis.value, fitted_onset_share=0.0, common_onset_m=0.0,
-        common_stick=0.0, shallow_stick=0.0,
-    )  # fmt: skip
+        floor_n=of_peak.value * PEAK_N, floor_share=Unnamed.share_curves.value, latency_s=0.0
+    )
     if not bench.specimens:
-        return plain
-    return dataclasses.replace(
+        return plain.each_by_itself()
+    of_pieces = dataclasses.replace(
         plain,
         press_stiffness=Repeats.pieces.value,
         law=DepthLaw.pieces.value,
         onset_m=FirstTouch.pieces.value,
-        fitted_onset_m=FirstTouch.pieces.value,
     )
+    return of_pieces.each_by_itself()
 
 
 def unseen_holds(bench: Bench, made: Diagnosis) -> tuple[float, float] | None:
