@@ -22,7 +22,7 @@ _TIP_SHARE, _DEPTH_SHARE = 0.12, 0.12
 """Of the object's least extent: its tip; of what lies under a place: its depth, at most DEEPEST_M."""
 _HERTZ_SHARE, _HERTZ_RADII = 0.4, 0.1
 """Of the tip by which Hertz is asked; and how deep, radii."""
-_THICK, _GENTLE, _RIM = 75.0, 0.1, 6.0
+_THICK, _GENTLE, _RIM = 75.0, 0.1, 20.0
 """Hertz applies where the object is so many times thicker than that contact is wide, bends by less than this
 over that tip, has no crease or support nearer than so many contact radii, and is pressed towards its support
 within 30 degrees: pressed on its side a body of 30 mm bends, which takes a tenth off."""

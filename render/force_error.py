@@ -234,7 +234,7 @@ def thickness_under(
     """(k,) m of a known shape below its places; infinite where nothing lies behind."""
     # rays meet the triangles, which lie a little beside the curved shape's places
     beyond = _SAGITTA * tip_radius_m
-    return first_hits(shape.vertices, shape.triangles, points, -normals, beyond=beyond)[0]
+    return first_hits(shape.vertices, shape.triangles, points, -normals, beyond=beyond, leaving=True)[0]
 
 
 def _through(model: Model, points: np.ndarray, normals: np.ndarray, tip_radius_m: float) -> np.ndarray:

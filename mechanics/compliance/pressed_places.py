@@ -18,7 +18,7 @@ from palpate.mechanics.model.model import Model
 from palpate.mechanics.presses.table import Presses
 from palpate.mechanics.shape.refine import refinement_key
 
-VERSION = 12
+VERSION = 13
 UNIFORM = "uniform solver"
 """Stage: the factorisation that the places were solved by, of the object of one modulus."""
 BENT_BY = ("curvature", "bracing", "braced")

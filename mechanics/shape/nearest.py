@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, cast
 
 import numpy as np
+
+_SAME_HIT_M = 1e-9
+"""Hits nearer to each other lie on the edge of two triangles."""
 
 
 def segments_cut(
@@ -132,27 +136,57 @@ def first_hits(
     directions: np.ndarray,
     *,
     beyond: float = 0.0,
+    leaving: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(k,) how far along unit directions (k, 3) rays from starts (k, 3) first meet the surface, infinite
     where they do not, and which triangle (k,) they meet there, -1 where none.
 
-    VTK's tree of oriented boxes names the triangles. beyond: nearer hits do not count.
+    beyond: nearer hits do not count. leaving: only where rays come out of the body count, by the winding
+    number: not where it crosses itself, nor where they enter.
     """
+    found, hit = np.full(len(starts), np.inf), np.full(len(starts), -1)
+    for k, (far, met, step) in enumerate(_hits(vertices, triangles, starts, directions)):
+        counts = far > beyond
+        if leaving:  # outside is what winds around 0 times: as many lead in as out of those farther on
+            counts &= (step > 0) & (step.sum() - np.cumsum(step) <= 0)
+        if counts.any():
+            first = np.argmax(counts)
+            found[k], hit[k] = far[first], met[first]
+    return found, hit
+
+
+def windings(
+    vertices: np.ndarray, triangles: np.ndarray, starts: np.ndarray, directions: np.ndarray
+) -> np.ndarray:
+    """(k,) how often a closed surface winds around starts (k, 3), which lie beside it, by rays along unit
+    directions (k, 3): 0 outside, 1 inside, -1 inside of what it encloses inside out."""
+    return np.array([step.sum() for *_, step in _hits(vertices, triangles, starts, directions)])
+
+
+def _hits(
+    vertices: np.ndarray, triangles: np.ndarray, starts: np.ndarray, directions: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Of each ray, by its hits from near to far (h,): m along it, the triangles, and 1 where it comes out
+    through one, -1 where it goes in; 0 of a second hit on the same edge. VTK's tree of oriented boxes names
+    the triangles."""
     import pyvista
 
     vertices, triangles = np.asarray(vertices, dtype=float), np.asarray(triangles)
     shell = pyvista.PolyData.from_regular_faces(vertices, triangles)
     across, _ = facings(vertices, triangles)
     middle, size = vertices.mean(axis=0), float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    found, hit = np.full(len(starts), np.inf), np.full(len(starts), -1)
-    for k, (start, way) in enumerate(zip(starts, directions, strict=True)):
+    for start, way in zip(starts, directions, strict=True):
         end = start + (float(np.linalg.norm(start - middle)) + size) * way
         met = np.unique(shell.ray_trace(start, end)[1]).astype(int)
         # a triangle that the ray runs along has no one place where they meet
         met = met[np.abs(across[met] @ way) > 1e-9 * np.linalg.norm(across[met], axis=1)]
         # the tree's points are of single precision, so where it meets each triangle's plane is found again
         far = np.einsum("ij,ij->i", vertices[triangles[met, 0]] - start, across[met]) / (across[met] @ way)
-        met, far = met[far > beyond], far[far > beyond]
-        if len(met):
-            found[k], hit[k] = far.min(), met[np.argmin(far)]
-    return found, hit
+        near_first = np.argsort(far, kind="stable")
+        near_first = near_first[far[near_first] > 0]
+        far, met = far[near_first], met[near_first]
+        step = np.where(across[met] @ way > 0, 1, -1)
+        for side in (1, -1):
+            of = np.flatnonzero(step == side)
+            step[of[np.diff(far[of], prepend=-np.inf) <= _SAME_HIT_M]] = 0
+        yield far, met, step

@@ -152,6 +152,11 @@ _SAMPLE_M = 1.2e-3
 _MOST_PIECES, _PIECE = 1_000_000, 0.18
 """So many pieces at about most, larger ones on an object beyond 0.26 m^2, where they took 3 GB; area of one
 over its longest edge squared."""
+_COARSE_M = 2.5e-3
+"""Longest edge from which a patch's curvature is its own, not what the normals at its corners turn by: as
+wide as a usual tip's contact, under which finer patches average out."""
+_THIN = 1e-6
+"""Width of a line over which the surface turns, over the length of its pieces."""
 _WIDTHS, _PAIRS = 2.7, 300_000
 """Widths of a Gaussian beyond which it is left out (0.03); pieces that are averaged at once."""
 
@@ -312,17 +317,62 @@ class TrueShape:
         instead = np.repeat(self._facets.unit, 3, axis=0)
         return np.concatenate([corners, unit_vectors(both.reshape(-1, 3), instead).reshape(-1, 3, 3)], axis=1)
 
+    def _square_to(self, triangle: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """(k, 3) unit normals that the cubic patches themselves have: `on`'s are smooth over their edges."""
+        u, v, w = np.einsum("kwb,kbx->wkx", _slopes(weights), self._control[triangle])
+        return unit_vectors(np.cross(v - u, w - u), self._facets.unit[triangle])
+
+    def _turns(
+        self, among: np.ndarray, longest_m: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Places, normals, areas and curvature tensors of pieces of at most `longest_m` of the edges between
+        patches of some triangles (m,), over which these turn: all but sharp creases, which are rims
+        (mechanics.contact.edges). Patches that are as wide do not meet smoothly, and a gentle crease is
+        curvature on a line."""
+        facets = self._facets
+        sharp = angle_between(facets.unit[:, None], facets.unit[facets.across]) >= np.radians(CREASE_DEGREES)
+        first = np.arange(len(self.triangles))[:, None] < facets.across
+        own, edge = np.nonzero(first & ~sharp & among[:, None] & among[facets.across])
+        beyond = facets.across[own, edge]
+        ends = self.triangles[own, edge], self.triangles[own, (edge + 1) % 3]
+        _, length, row = segments_cut(*(self.vertices[each] for each in ends), longest_m)
+        count = np.bincount(row, minlength=len(own))
+        share = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
+        on_own, on_other = np.zeros((2, len(row), 3))
+        for weights, of in ((on_own, own), (on_other, beyond)):
+            for corner, part in zip(ends, (1 - share, share), strict=True):
+                at = (self.triangles[of] == corner[:, None]).argmax(axis=1)
+                weights[np.arange(len(row)), at[row]] = part
+        places, facing = self.on(own[row], on_own)
+        one, other = self._square_to(own[row], on_own), self._square_to(beyond[row], on_other)
+        along = self.vertices[ends[1]] - self.vertices[ends[0]]
+        convex = np.einsum("kx,kx->k", np.cross(one, other), along[row])
+        turn, way = np.copysign(angle_between(one, other), convex), unit_vectors(one - other, one)
+        area = _THIN * longest_m * length
+        tensor = (turn * length / np.maximum(area, 1e-300))[:, None, None] * way[:, :, None] * way[:, None, :]
+        return places, facing, area, tensor
+
     @cached_property
     def _bends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, cKDTree]:
-        """Places, normals, areas and curvature tensors of pieces of the surface of at most _SAMPLE_M, or as
-        small as _MOST_PIECES allow."""
-        bend = _bends(self.vertices[self.triangles], self.corner_normals)
+        """Places, normals, areas and curvature tensors of pieces of the curved shape of at most _SAMPLE_M, or
+        as small as _MOST_PIECES allow, and of the lines between patches over which it turns."""
         surface = float(triangle_areas(self.vertices, self.triangles).sum())
         longest = max(_SAMPLE_M, np.sqrt(surface / (_PIECE * _MOST_PIECES)))
         triangle, corners = _pieces(self.vertices[self.triangles], longest)
         places, facing = self.on(triangle, corners.mean(axis=1))
         p = np.einsum("kcw,kwx->kcx", corners, self.vertices[self.triangles[triangle]])
         area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+        bend = _bends(self.vertices[self.triangles], self.corner_normals)[triangle]
+        sides = np.roll(self.vertices[self.triangles], -1, axis=1) - self.vertices[self.triangles]
+        coarse = np.linalg.norm(sides, axis=2).max(axis=1) > _COARSE_M
+        some = coarse[triangle]
+        whole = triangle[some].repeat(3), corners[some].reshape(-1, 3)
+        at = np.einsum("kb,kbx->kx", _bernstein(whole[1]), self._control[whole[0]])
+        bend[some] = _bends(at.reshape(-1, 3, 3), self._square_to(*whole).reshape(-1, 3, 3))
+        lines = self._turns(coarse, longest)
+        places, facing, area, bend = (
+            np.concatenate(both) for both in zip((places, facing, area, bend), lines, strict=True)
+        )
         # pieces of one cell that look alike count as one: a fine file takes no longer
         cell = np.hstack([np.floor(places / longest), np.rint(3 * facing)]).astype(np.int64)
         cell -= cell.min(axis=0)
@@ -334,7 +384,7 @@ class TrueShape:
             sums = np.stack([np.bincount(cell, column) for column in columns], axis=1)
             return (sums / total[:, None]).reshape(-1, *values.shape[1:])
 
-        places, facing, tensors = mean(places), mean(facing), mean(bend[triangle])
+        places, facing, tensors = mean(places), mean(facing), mean(bend)
         facing /= np.linalg.norm(facing, axis=1, keepdims=True)
         return places, facing, total, tensors, cKDTree(places)
 
@@ -372,6 +422,18 @@ def _bernstein(weights: np.ndarray) -> np.ndarray:
     u, v, w = weights.T
     outer = [3 * u * u * v, 3 * u * v * v, 3 * v * v * w, 3 * v * w * w, 3 * w * w * u, 3 * w * u * u]
     return np.stack([u**3, v**3, w**3, *outer, 6 * u * v * w], axis=1)
+
+
+def _slopes(weights: np.ndarray) -> np.ndarray:
+    """(k, 3, 10) derivatives of `_bernstein` by each of the weights (k, 3)."""
+    u, v, w = weights.T
+    o = np.zeros_like(u)
+    rows = [
+        [3 * u * u, o, o, 6 * u * v, 3 * v * v, o, o, 3 * w * w, 6 * w * u, 6 * v * w],
+        [o, 3 * v * v, o, 3 * u * u, 6 * u * v, 6 * v * w, 3 * w * w, o, o, 6 * u * w],
+        [o, o, 3 * w * w, o, o, 3 * v * v, 6 * v * w, 6 * w * u, 3 * u * u, 6 * u * v],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def _bends(p: np.ndarray, normals: np.ndarray) -> np.ndarray:

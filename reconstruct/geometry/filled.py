@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 from palpate.mechanics.disk.surface_files import ClosedSurface, surface_of
 from palpate.mechanics.errors import MeshError, NotClosedError, SurfaceError
-from palpate.mechanics.shape.nearest import distance, inside, sample
+from palpate.mechanics.shape.nearest import distance, facings, inside, sample, windings
 from palpate.mechanics.shape.tetmesh import FACES, lone_faces
 from palpate.reconstruction.steps.s5_mesh.tetwild import tetrahedralize
 
@@ -32,25 +32,53 @@ _ROUNDING = 3e-4
 _ASTRAY, _AT_ONCE = 0.05, 20_000_000
 """Of the points that the triangles wind around: so many may lie outside of the solid, or others in it; points
 times triangles that are looked at."""
+_RAYS, _BESIDE, _PUSHED = 2000, 1e-5, 3e-3
+"""Rays by which a surface is looked for that bounds no solid; where they begin, of the diagonal beside it;
+its share of the area up to which it is let be."""
 _NEAR, _FOLLOWED, _SOLID = 0.01, 0.9, 0.02
 """How near the solid's surface, of the diagonal, triangles lie that it follows, and their least share of the
 area; the solid's least share of its box."""
 
 
 def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> ClosedSurface:
-    """As `surface_of`; where that finds no solid, the one that the triangles' winding number tells.
+    """As `surface_of`; where that finds no solid, or sheets that bound none, the one that the triangles'
+    winding number tells.
 
     Raises NotClosedError, as `surface_of` does, where there is none, or it does not follow the triangles.
     """
     try:
-        return surface_of(shape, unit, up)
+        found = surface_of(shape, unit, up)
     except NotClosedError as error:
-        refused = error
+        diagonal = float(np.linalg.norm(np.ptp(error.vertices, axis=0)))
+        return _sewn(error, _ROUNDING * diagonal, up) or _filled(error)
+    share = _inside_out(found)
+    if share <= _PUSHED:
+        return found
+    pushed = f"crosses itself, and bounds nothing by {100 * share:.2g} % of its area"
+    given = (found.name, found.vertices, found.triangles)
+    try:
+        return _filled(NotClosedError(f"'{found.name}' {pushed}", *given))
+    except NotClosedError:
+        return replace(found, notes=(*found.notes, f"it {pushed}: a tip may be felt there too early"))
+
+
+def _inside_out(surface: ClosedSurface) -> float:
+    """Share of the area outside of which the surface winds around the other way, as where a fold is pushed
+    out through itself: no solid is there, and a tip must not meet it. Crossing bodies have none."""
+    vertices, triangles = surface.vertices, surface.triangles
+    across, facing = facings(vertices, triangles)
+    area = np.linalg.norm(across, axis=1)
+    drawn = np.random.default_rng(0)
+    one = drawn.choice(len(triangles), _RAYS, p=area / area.sum())
+    points = np.einsum("kw,kwx->kx", drawn.dirichlet(np.ones(3), _RAYS), vertices[triangles[one]])
+    beside = _BESIDE * np.linalg.norm(np.ptp(vertices, axis=0))
+    return float((windings(vertices, triangles, points + beside * facing[one], facing[one]) < 0).mean())
+
+
+def _filled(refused: NotClosedError) -> ClosedSurface:
+    """What the triangles wind around; raises `refused` where that is no solid, or does not follow them."""
     vertices, triangles = refused.vertices, refused.triangles
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    sewn = _sewn(refused, _ROUNDING * diagonal, up)
-    if sewn is not None:
-        return sewn
     try:
         points, cells = tetrahedralize(
             vertices, triangles, edge_m=_EDGE * diagonal, envelope_m=_ENVELOPE * diagonal, passes=_PASSES

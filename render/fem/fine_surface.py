@@ -132,7 +132,7 @@ def kept_curvature(model: Model, points: np.ndarray, normals: np.ndarray) -> np.
     shape = model.mesh.shape
     if model.path is None or shape is None:
         return _curvature(model, points, normals)
-    key = content_key("curvature 2", shape.key, points, normals, float(model.tool.tip_radius_m))
+    key = content_key("curvature 3", shape.key, points, normals, float(model.tool.tip_radius_m))
     path = model.path / f"curvature-{key[:16]}.bin"
     return load_or_build(path, key, lambda: {"felt": _curvature(model, points, normals)})["felt"]
 

@@ -32,3 +32,16 @@ def test_a_ray_along_a_wall_meets_no_place_of_it() -> None:
         )
     assert face[0] < 0 or abs(cube.face_normals[face[0]][2]) == 1
     assert not np.isnan(far[0])
+
+
+def test_a_ray_is_out_of_a_body_only_where_no_other_part_of_it_goes_on() -> None:
+    # two blocks cross: their inner faces are no wall, nor is a facet below a place that a curve puts above it
+    blocks = [trimesh.creation.box((0.02, 0.02, 0.02)), trimesh.creation.box((0.02, 0.02, 0.02))]
+    blocks[1].apply_translation([0, 0, 0.015])
+    both = trimesh.util.concatenate(blocks)
+    starts = np.array([[0.003, 0.001, 0.0255], [0.0, 0.0, 0.025], [0.003, 0.001, -0.01]])
+    ways = np.array([[0, 0, -1.0], [0, 0, -1.0], [0, 0, 1.0]])
+    far, face = first_hits(both.vertices, both.faces, starts, ways, beyond=1e-4, leaving=True)
+    assert np.allclose(far, [0.0355, 0.035, 0.035], atol=1e-12)
+    assert np.allclose(both.face_normals[face], ways)
+    assert np.allclose(first_hits(both.vertices, both.faces, starts, ways, beyond=1e-4)[0][0], 5e-4)

@@ -104,3 +104,20 @@ def test_a_closed_surface_winds_once_around_what_is_inside():
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.03)
     points = np.array([[0.0, 0, 0], [0.01, 0.02, 0], [0.04, 0, 0]])
     assert filled.winding(ball.vertices, ball.faces, points) == pytest.approx([1, 1, 0], abs=1e-9)
+
+
+def test_a_fold_that_bounds_nothing_is_taken_off_and_crossing_bodies_are_let_be():
+    """A tip would be felt on the sheet that a fold pushes out through the surface, a millimetre too early."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)
+    whole = solid_of(ball)
+    assert not whole.notes
+    folded = ball.copy()
+    near = np.linalg.norm(folded.vertices - [0.024, 0, 0.018], axis=1) < 0.008
+    folded.vertices[near] += [0.006, 0, -0.014]
+    found = solid_of(folded)
+    assert "crosses itself" in found.notes[0] and "filled" in found.notes[0]
+    assert filled._inside_out(found) == 0.0
+    beside = ball.copy()
+    beside.apply_translation([0.02, 0, 0])
+    both = solid_of(trimesh.util.concatenate([ball, beside]))
+    assert filled._inside_out(both) == 0.0 and not any("itself" in note for note in both.notes)

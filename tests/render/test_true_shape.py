@@ -11,7 +11,7 @@ import trimesh
 from palpate.mechanics.compliance.sites import principal_curvatures, touch_sites
 from palpate.mechanics.contact.dent import dent_law, ellipse_curvature
 from palpate.mechanics.contact.edges import edge_law
-from palpate.mechanics.frames import unit_vectors
+from palpate.mechanics.frames import local_frames, unit_vectors
 from palpate.mechanics.model.files import read_model, write_model
 from palpate.mechanics.model.model import Model
 from palpate.mechanics.shape.nearest import neighbours, sample
@@ -277,6 +277,39 @@ def test_curvatures_are_the_shapes_and_not_the_meshs():
     felt_bend = ellipse_curvature(bent, made.tool.tip_radius_m)
     assert felt_bend == pytest.approx(field.curvature[touched])
     assert bent[:, 0].max() == pytest.approx(1 / FILLET, rel=0.05)
+
+
+def test_a_gentle_crease_is_curvature_on_a_line_and_a_sharp_one_is_none():
+    turn, width = np.radians(20), 2.2e-3
+    for angle, there in ((turn, turn / (np.sqrt(2 * np.pi) * width)), (np.radians(60), 0.0)):
+        drop = 0.03 * np.tan(angle / 2)
+        outline = np.array([[-0.03, -0.05], [0.03, -0.05], [0.03, -drop], [0, 0], [-0.03, -drop]])
+        ends = [np.insert(outline, 1, y, axis=1) for y in (-0.04, 0.04)]
+        roof = trimesh.convex.convex_hull(np.vstack(ends))
+        values, direction = TrueShape(roof.vertices, roof.faces).curvatures(
+            np.zeros((1, 3)), np.array([[0, 0, 1.0]]), width
+        )
+        assert values[0] == pytest.approx([there, 0.0], rel=0.03, abs=0.5)
+        assert not there or abs(direction[0, 0]) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_curvature_of_a_coarse_file_is_that_of_the_surface_that_is_felt():
+    """Beside a paraboloid through that surface: its patches, a centimetre wide, do not meet smoothly."""
+    lumpy = trimesh.creation.icosphere(subdivisions=2, radius=1.0)
+    lumpy.vertices *= 1 + 0.08 * np.sin(lumpy.vertices @ [3.1, -1.7, 2.3])[:, None]
+    shape = TrueShape(lumpy.vertices * [0.06, 0.04, 0.03], lumpy.faces)
+    width, draw = 2.2e-3, np.random.default_rng(0)
+    places, normals = shape.foot(sample(shape.vertices, shape.triangles, 40, 3))
+    told = shape.curvatures(places, normals, width)[0].sum(axis=1)
+    fitted = []
+    for place, frame in zip(places, local_frames(normals), strict=True):
+        beside = shape.foot(place + 2 * width * draw.uniform(-1, 1, (2000, 2)) @ frame[1:])[0]
+        z, x, y = frame @ (beside - place).T
+        columns = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+        weight = np.exp(-(x**2 + y**2) / width**2 / 4)
+        bent = np.linalg.lstsq(columns * weight[:, None], z * weight, rcond=None)[0]
+        fitted.append(-2 * (bent[3] + bent[5]))
+    assert np.median(np.abs(told / fitted - 1)) < 0.12
 
 
 @pytest.fixture(scope="module")
