@@ -14,7 +14,7 @@ from palpate.render.force_error import said
 from palpate.render.press import Curve
 from palpate.show import story as say
 from palpate.show.colours import COLOURS, colour_of
-from palpate.show.model import facing, thing_of, usual_colourings
+from palpate.show.model import facing, mended_words, parts_words, thing_of, usual_colourings
 from palpate.show.page import feel_step
 from palpate.show.quantities import DEPTH
 from palpate.show.view3d import Colouring, Line, Traces, View
@@ -58,6 +58,7 @@ def story(result: Curve, written: str | None = None, touched: str | None = None)
         f"{result.t[-1]:.3g} s; the object's Young's modulus{part_words(made)} is "
         f"{kpa(made.material.young_modulus_pa, '.4g')}"
     )
+    yield from map(say.Detail, filter(None, (parts_words(made), mended_words(made))))
     if result.unsettled:
         yield say.Sentence(unsettled_words(result.unsettled, len(result.t)))
     if words := said(result.error_figures, from_touch=True):

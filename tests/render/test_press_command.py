@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from palpate.cli import main
 from palpate.mechanics.errors import OptionError
+from palpate.mechanics.model.files import read_model, write_model
 from palpate.render.press import read_curve
 from palpate.testing import press_model  # noqa: F401  (pytest finds the fixture by its name)
 
@@ -32,6 +35,14 @@ def test_a_curve_that_was_stored_is_met_again_and_another_law_is_told(model_fold
     found = json.loads(result.read_text())
     assert found["passed"] is False and found["difference_n"] > 0.01
     assert found["depth_m"] == pytest.approx(0.003, abs=1e-6)
+
+
+def test_what_was_mended_in_a_file_is_said_where_it_is_pressed(model_folder, tmp_path, capsys):
+    model = read_model(Path(model_folder))
+    mended = replace(model, provenance={**model.provenance, "mended": "it crosses itself"}, path=None)
+    write_model(tmp_path / "mended", mended)
+    assert main(["press", str(tmp_path / "mended"), *DOWN]) == 0
+    assert "the file's surface was mended: it crosses itself" in capsys.readouterr().out
 
 
 def test_a_softer_object_and_another_press_do_not_pass_unasked(model_folder, tmp_path):
