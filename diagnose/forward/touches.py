@@ -54,26 +54,9 @@ def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
     rows = (seen.t >= (seen.onset_s - LEAD_S)[seen.press]) & (
         seen.t < np.minimum(seen.end_s + LEAD_S, limit)[seen.press]
     )
-    seen = seen.where(rows & ~_elsewhere(seen)).thinned(step_s)
+    seen = seen.where(rows).thinned(step_s)
     lasting = (seen.end_s - seen.onset_s >= LEAST_S) & (np.diff(seen.starts) >= LEAST_ROWS)
     return _enough(seen, lasting, f"last {LEAST_S} s or more")
-
-
-def _elsewhere(presses: Presses) -> np.ndarray:
-    """(n,) bool: rows at which the tip had left its press, or not yet come to it, and was beside the object,
-    where the surface of this place would say that it is deep inside: a force that reads on in free air makes
-    a press longer than its contact."""
-    out = presses.travel[:, 0] < -REACH_M
-    aside = np.linalg.norm(presses.travel[:, 1:], axis=1)
-    other = (presses.travel[:, 0] > 0) & (aside > presses.tip_radius_m)
-    beyond = np.zeros(len(presses.t), dtype=bool)
-    for peak, part in zip(presses.peak_s, presses.parts, strict=True):
-        after = presses.t[part] > peak
-        left = np.logical_or.accumulate(out[part] & after)
-        to_come = np.logical_or.accumulate((out[part] & ~after)[::-1])[::-1]
-        beyond[part] = np.logical_or.accumulate(left & other[part])
-        beyond[part] |= np.logical_or.accumulate((to_come & other[part])[::-1])[::-1]
-    return beyond
 
 
 def _enough(seen: Presses, good: np.ndarray, words: str) -> Presses:

@@ -30,6 +30,10 @@ below 10 Hz, read at 2 kHz."""
 _MOST_AFTER_S = 0.1
 """A touch is lost so soon after it no longer stands above the noise, or then."""
 
+_LEFT_M = 5e-3
+"""A press is over where the tip's centre is so high above where it first touched, whatever the force reads:
+no first touch is off, and no neck of glue drawn, by as much."""
+
 
 def loss_of_touch(
     t: np.ndarray,
@@ -258,9 +262,18 @@ def _ends(
             continue
         if until is not None:
             limits[i] = min(limits[i], max(until[i], found.peak_s[i]) + delay_s + _MOST_AFTER_S)
+        limits[i] = min(limits[i], _left(recording, found, i, limits[i]))
         near = slice(*np.searchsorted(t, [onset[i] - 0.2, max(limits[i], found.peak_s[i]) + 0.2]))
         end[i] = loss_of_touch(
             t[near], (recording.force_on_tool - free_air)[near] @ normal[i], recording.sample_rate_hz,
             onset_s=onset[i], peak_s=found.peak_s[i], limit_s=limits[i], noise_n=noise_n,
         )  # fmt: skip
     return end
+
+
+def _left(recording: Recording, found: FoundPresses, i: int, limit_s: float) -> float:
+    """s, when the tip has left press i after its greatest force, or the limit: a tool whose weight reads on
+    would keep touching while the hand swings down beside the object, 26 mm deep by this place."""
+    begin, stop = np.searchsorted(recording.t, [found.peak_s[i], limit_s])
+    up = (recording.position[begin:stop] - found.centre[i]) @ found.normal[i] > _LEFT_M
+    return float(recording.t[begin + np.argmax(up)]) if up.any() else limit_s

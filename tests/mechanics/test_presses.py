@@ -61,6 +61,21 @@ def test_a_table_knows_touch_depth_site_and_noise():
     assert not presses.t.flags.writeable
 
 
+def test_a_press_is_over_where_the_tip_has_left_whatever_the_force_reads():
+    """A tool's weight reads on, and the hand swings down beside the object: it was 26 mm deep, and a lump."""
+    made = recording()
+    clock = made.t % 2.0
+    gone = np.clip((clock - 1.85) / 0.15, 0, 1)[:, None] * (clock >= 1.85)[:, None]
+    swing = 0.03 * np.sin(np.pi * gone) * UP + gone**2 * [0.0, 0.05, -0.026]
+    weighs = 0.4 * ((clock > 1.55) & (clock < 2.0))[:, None] * UP
+    moved = dataclasses.replace(
+        made, position=made.position + swing, force_on_tool=made.force_on_tool + weighs
+    )
+    presses = table(moved)
+    assert presses.end_s - presses.onset_s == pytest.approx(np.full(6, 0.7), abs=0.05)
+    assert presses.depth_m == pytest.approx(np.full(6, 0.004), rel=1e-3)
+
+
 def test_work_that_does_not_come_back_is_a_share_of_what_was_spent():
     """A log of a material that creeps gave 28 kPa (26.5 to 29.4), and 22 with its creep: nothing said so."""
     made = recording(noise=0.05)
