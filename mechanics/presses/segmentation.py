@@ -31,8 +31,8 @@ _MOST_AFTER_S = 0.1
 """A touch is lost so soon after it no longer stands above the noise, or then."""
 
 _LEFT_M = 5e-3
-"""A press is over where the tip's centre is so high above where it first touched, whatever the force reads:
-no first touch is off, and no neck of glue drawn, by as much."""
+"""A press is over where the tip's centre is so high above where it first touched, and higher than aside,
+whatever the force reads: no first touch is off, no neck of glue drawn, and nothing climbed by as much."""
 
 
 def loss_of_touch(
@@ -275,5 +275,8 @@ def _left(recording: Recording, found: FoundPresses, i: int, limit_s: float) -> 
     """s, when the tip has left press i after its greatest force, or the limit: a tool whose weight reads on
     would keep touching while the hand swings down beside the object, 26 mm deep by this place."""
     begin, stop = np.searchsorted(recording.t, [found.peak_s[i], limit_s])
-    up = (recording.position[begin:stop] - found.centre[i]) @ found.normal[i] > _LEFT_M
-    return float(recording.t[begin + np.argmax(up)]) if up.any() else limit_s
+    way = recording.position[begin:stop] - found.centre[i]
+    up = way @ found.normal[i]
+    aside = np.linalg.norm(way - up[:, None] * found.normal[i], axis=1)
+    left = up > np.maximum(_LEFT_M, aside)
+    return float(recording.t[begin + np.argmax(left)]) if left.any() else limit_s

@@ -55,11 +55,15 @@ def solid_of(shape: Any, unit: str = "m", up: np.ndarray | None = None) -> Close
     if share <= _PUSHED:
         return found
     pushed = f"crosses itself, and bounds nothing by {100 * share:.2g} % of its area"
-    given = (found.name, found.vertices, found.triangles)
+    kept = replace(found, notes=(*found.notes, f"it {pushed}: a tip may be felt there too early"))
+    if found.parts:  # bodies and labels would be one
+        return kept
     try:
-        return _filled(NotClosedError(f"'{found.name}' {pushed}", *given))
+        return _filled(
+            NotClosedError(f"'{found.name}' {pushed}", found.name, found.vertices, found.triangles)
+        )
     except NotClosedError:
-        return replace(found, notes=(*found.notes, f"it {pushed}: a tip may be felt there too early"))
+        return kept
 
 
 def _inside_out(surface: ClosedSurface) -> float:
