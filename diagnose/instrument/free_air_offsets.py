@@ -150,7 +150,7 @@ def _weight(made: _FreeAirParts, forward: Forward, free: FreeAir, rules: Attribu
             {"mass_kg": mass, "tared": True, "weight_n": weight.tolist()},
             f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared",
         )
-    elif turning is None and abs(free.mass_kg) > rules.z * free.mass_se_kg:
+    elif turning is None and free.mass_kg > rules.z * free.mass_se_kg:  # no tool has less than none
         weight = -STANDARD_GRAVITY * forward.model.support.normal
         untared = made.level @ weight / (weight @ weight) > 0.5 * free.mass_kg
         part = -free.mass_kg * forward.acceleration

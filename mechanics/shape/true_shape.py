@@ -335,7 +335,8 @@ class TrueShape:
         own, edge = np.nonzero(first & ~sharp & among[:, None] & among[facets.across])
         beyond = facets.across[own, edge]
         ends = self.triangles[own, edge], self.triangles[own, (edge + 1) % 3]
-        _, length, row = segments_cut(*(self.vertices[each] for each in ends), longest_m)
+        start, end = self.vertices[ends[0]], self.vertices[ends[1]]
+        _, length, row = segments_cut(start, end, longest_m)
         count = np.bincount(row, minlength=len(own))
         share = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
         on_own, on_other = np.zeros((2, len(row), 3))
@@ -345,8 +346,7 @@ class TrueShape:
                 weights[np.arange(len(row)), at[row]] = part
         places, facing = self.on(own[row], on_own)
         one, other = self._square_to(own[row], on_own), self._square_to(beyond[row], on_other)
-        along = self.vertices[ends[1]] - self.vertices[ends[0]]
-        convex = np.einsum("kx,kx->k", np.cross(one, other), along[row])
+        convex = np.einsum("kx,kx->k", np.cross(one, other), (end - start)[row])
         turn, way = np.copysign(angle_between(one, other), convex), unit_vectors(one - other, one)
         area = _THIN * longest_m * length
         tensor = (turn * length / np.maximum(area, 1e-300))[:, None, None] * way[:, :, None] * way[:, None, :]

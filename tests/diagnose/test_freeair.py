@@ -69,6 +69,21 @@ def test_what_is_sure_is_taken_off_and_what_matters_is_named(bench, bias_n, name
     assert np.allclose(offsets.residual, 0.0) == (not named)
 
 
+@pytest.mark.parametrize(("mass_kg", "named"), [(0.5, ("tool_gravity_inertia",)), (-0.5, ())])
+def test_no_tool_has_less_mass_than_none(bench, mass_kg, named):
+    """A force that came 40 ms late once read as -7 g of tool, named beside it."""
+    _, model = bench.record()
+
+    def swung(t, x, f):
+        return x, f - mass_kg * np.gradient(np.gradient(x, t, axis=0), t, axis=0)
+
+    recording, _ = bench.record(swung)
+    free = free_air_of(recording, model.presses)
+    assert abs(free.mass_kg) > 5 * free.mass_se_kg and free.mass_kg * mass_kg > 0
+    forward = build_forward(touches_of(bench.table(recording)), model)
+    assert find_instrument_offsets(forward, free, None, {"force_bias"}).names == named
+
+
 @pytest.mark.parametrize("stated", [True, False])
 def test_the_tracing_of_the_base_is_no_bias(stated):
     """Phase I left unstated once read as 1.4 N in free air."""
